@@ -2,7 +2,7 @@
 //!
 //! A reply is one slice of slots: first the contact records in the order (time, a, b), then the further slots that were
 //! asked for. A contact record names the first of its further slots by its index in the slice. A further slot is the
-//! same 128 bytes seen as [`PatchSlot`] or [`DetailSlot`]; its first word says which.
+//! same 128 bytes seen as [`DetailSlot`], [`RegionSlot`], [`PatchSlot`] or [`ClearanceSlot`]; its first word says which.
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;

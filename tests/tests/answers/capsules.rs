@@ -169,7 +169,7 @@ fn certificates_of_capsules_against_every_kind_and_of_trees_with_them_hold() {
 
 #[test]
 fn trees_with_capsules_have_the_values_and_the_volumes_of_an_independent_evaluation() {
-    values_and_volumes(shape_or_capsule, (pairs(90).div_ceil(30).min(24), 3, pairs(90) * 10), [96, 61]);
+    values_and_volumes(shape_or_capsule, (pairs(60).div_ceil(30).min(24), 3, pairs(60) * 10), [64, 41]);
 }
 
 #[test]

@@ -276,7 +276,7 @@ fn wrong(rng: &mut Random, known: &Known, o: &Outcome) -> Option<String> {
 
 /// Asks scenes of a class; no answer may be undecided or wrong, nor dearer than `most` cells (the median than `median`).
 fn hold(name: &str, draw: fn(&mut Random) -> Known, [median, most]: [u64; 2]) {
-    let (first, count) = (sized("CONTACTD_COINCIDENT_FIRST", 0), sized("CONTACTD_COINCIDENT_SCENES", 20));
+    let (first, count) = (sized("CONTACTD_COINCIDENT_FIRST", 0), sized("CONTACTD_COINCIDENT_SCENES", 10));
     let limit = sized("CONTACTD_COINCIDENT_CELLS", 100_000_u64);
     let mut cells = Vec::new();
     let mut faults = Vec::new();

@@ -659,7 +659,7 @@ fn the_line_along_a_capsule_ends_with_its_side() {
 fn points_on_a_body_of_parts_in_each_other_are_on_its_surface() {
     let mut r = Random::new(0x0072_6f75_6e64);
     let (mut told, mut lines) = (0, 0);
-    for i in 0..sized("CONTACTD_REGIONS", 90) {
+    for i in 0..sized("CONTACTD_REGIONS", 30) {
         let (half, radius) = (dvec3(r.within(0.2, 0.6), r.within(0.2, 0.6), r.within(0.2, 0.6)), r.within(0.05, 0.3));
         let mut rounded = Recipe::cuboid(half.x + radius, half.y, half.z);
         rounded = rounded.union(Recipe::cuboid(half.x, half.y + radius, half.z));
@@ -701,7 +701,7 @@ fn points_on_a_body_of_parts_in_each_other_are_on_its_surface() {
         }
     }
     println!("{told} points, {lines} lines");
-    assert!(told > 120 && lines > 10, "{told} points, {lines} lines");
+    assert!(told > 40 && lines > 3, "{told} points, {lines} lines");
 }
 
 /// A hull whose bottom is nearly flat in many facets, on a face within a margin: whatever the work allows, where they touch is told.
@@ -749,7 +749,7 @@ fn a_ball_beside_a_rounded_disc_is_as_far_as_its_centre_says() {
         flat.union(rim().at(0.0, 0.0, half)).union(rim().at(0.0, 0.0, -half))
     };
     let mut r = Random::new(37);
-    for k in 0..sized("CONTACTD_ROUNDED", 150) {
+    for k in 0..sized("CONTACTD_ROUNDED", 50) {
         let gap = 10f64.powf(r.within(-4.0, -2.0));
         // About the seam between flat and round as well as anywhere.
         let angle = if r.chance(0.5) { r.within(0.0, FRAC_PI_2) } else { r.within(0.0, 0.05) };
@@ -774,7 +774,7 @@ fn a_ball_beside_a_rounded_disc_is_as_far_as_its_centre_says() {
 fn the_nearest_region_within_a_margin_is_as_far_as_the_least_distance() {
     let mut r = Random::new(91);
     let (mut asked, mut off) = (0, 0);
-    for k in 0..sized("CONTACTD_NEAREST", 60) {
+    for k in 0..sized("CONTACTD_NEAREST", 30) {
         let body = |r: &mut Random| match r.below(4) {
             0 => tree(r, 2 + k % 3),
             1 => Recipe::torus(r.within(0.5, 1.0), r.within(0.1, 0.4)),

@@ -1,6 +1,6 @@
 //! Thirteen families of random scenes: nothing is wrong by judges that share no code with the engine, and nothing undecided.
 //!
-//! In the command 10 scenes of each; `CONTACTD_FAMILY_SCENES` says how many in the long form, `CONTACTD_FAMILY_SEED` which
+//! In the command 5 scenes of each; `CONTACTD_FAMILY_SCENES` says how many in the long form, `CONTACTD_FAMILY_SEED` which
 //! (1 by default). `cargo run --release -p contactd-benches --bin families` tells what they cost.
 
 use crate::tight::Pair;
@@ -20,7 +20,7 @@ const CELLS: u64 = 20_000;
 
 #[test]
 fn nothing_is_wrong_and_nothing_undecided() {
-    let (scenes, seed) = (sized("CONTACTD_FAMILY_SCENES", 10), sized("CONTACTD_FAMILY_SEED", 1));
+    let (scenes, seed) = (sized("CONTACTD_FAMILY_SCENES", 5), sized("CONTACTD_FAMILY_SEED", 1));
     let cells = if scenes > 40 { 0 } else { CELLS };
     let of_family = |family: usize| {
         let verdicts: Vec<_> = (0..scenes)
@@ -50,7 +50,7 @@ fn nothing_is_wrong_and_nothing_undecided() {
 /// engine's limit and be left undecided.
 #[test]
 fn nothing_is_wrong_of_trees_of_a_hundred_primitives_and_more() {
-    let (scenes, seed) = (sized("CONTACTD_SIZED_SCENES", 4), sized("CONTACTD_FAMILY_SEED", 1));
+    let (scenes, seed) = (sized("CONTACTD_SIZED_SCENES", 2), sized("CONTACTD_FAMILY_SEED", 1));
     let verdicts: Vec<_> = (0..scenes)
         .into_par_iter()
         .map(|index| {
@@ -99,7 +99,8 @@ fn scenes_are_what_their_seed_says() {
 fn the_judge_notices_wrong_answers() {
     let mut noticed = [0; 5];
     let mut contacts = 0;
-    for index in 0..30 {
+    let scenes = sized("CONTACTD_FAMILY_SCENES", 16);
+    for index in 0..scenes {
         let scene = scene(1, 0, index);
         let answer = ask(&scene, 0).expect("an answer");
         let o = answer.pair.outcome;
@@ -129,7 +130,7 @@ fn the_judge_notices_wrong_answers() {
         assert_eq!(judge(&scene, &o, Effort::Quick, || answer.witness()), [], "scene {index}");
     }
     println!("{contacts} contacts; noticed: {noticed:?}");
-    assert!(contacts >= 10);
+    assert!(3 * contacts as u64 >= scenes, "{contacts} of {scenes}");
     assert!(noticed[..2].iter().all(|n| n * 20 >= contacts * 17), "misses go unnoticed: {noticed:?} of {contacts}");
     assert!(noticed[2..].iter().all(|n| *n == contacts), "{noticed:?} of {contacts}");
 }
@@ -453,7 +454,8 @@ fn the_judge_finds_how_deep_a_leaning_peg_starts() {
     // The resolution of its answer, to which rounding raises its own.
     let delta = 1.766_873e-9;
     for (factor, is_miss) in [(0.7, true), (1.0, false), (1.1, true)] {
-        let found = judge(&scene, &Outcome::clear(factor * delta), Effort::Thorough, || None);
+        let effort = if is_miss { Effort::Quick } else { Effort::Thorough };
+        let found = judge(&scene, &Outcome::clear(factor * delta), effort, || None);
         assert_eq!(found.iter().any(|f| f.kind == "miss"), is_miss, "{factor}: {found:?}");
     }
 }
@@ -480,11 +482,13 @@ fn the_judge_knows_what_starts_in_touch() {
         let comes_to_touch = from(dvec3(0.0, 0.0, -0.3));
         let answer = ask(&starts_in_touch, 0).expect("an answer");
         let clear = Outcome::clear(delta);
-        let misses = |scene: &Scene| {
-            let found = judge(scene, &clear, Effort::Thorough, || None);
+        // What is there is found at once; that nothing is there is said after a long look.
+        let misses = |scene: &Scene, is_miss: bool| {
+            let effort = if is_miss { Effort::Quick } else { Effort::Thorough };
+            let found = judge(scene, &clear, effort, || None);
             found.iter().any(|f| f.kind == "miss")
         };
-        assert_eq!(misses(&starts_in_touch), is_miss, "depth {depth:e}: {:?}", answer.pair.outcome);
-        assert!(misses(&comes_to_touch), "depth {depth:e}");
+        assert_eq!(misses(&starts_in_touch, is_miss), is_miss, "depth {depth:e}: {:?}", answer.pair.outcome);
+        assert!(misses(&comes_to_touch, true), "depth {depth:e}");
     }
 }

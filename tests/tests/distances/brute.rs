@@ -2,7 +2,7 @@
 //!
 //! The judge has its own f (`reference::field`) and its own motion. From above: the two points that are told lie in their bodies and are
 //! as far apart as the upper bound. From below: of thousands of points drawn in both bodies, and of the nearest of them moved nearer as
-//! long as they stay inside, none are nearer than the lower bound. `CONTACTD_DISTANCE_TREES=2000` sets the number of pairs (16 by
+//! long as they stay inside, none are nearer than the lower bound. `CONTACTD_DISTANCE_TREES=2000` sets the number of pairs (6 by
 //! default), each at an instant and over a step.
 
 use contactd::contact::PlacedModel;
@@ -95,7 +95,7 @@ fn refuted(d: &Distance, a: &Body, b: &Body, times: &[f64], tolerance: f64, r: &
 
 #[test]
 fn no_points_refute_the_distances_of_trees() {
-    let count = sized("CONTACTD_DISTANCE_TREES", 16usize);
+    let count = sized("CONTACTD_DISTANCE_TREES", 6usize);
     let (mut failures, mut cells, mut apart) = (Vec::new(), [0, 0], [0, 0]);
     let mut most = [0, 0];
     for i in 0..count {
@@ -139,7 +139,7 @@ fn no_points_refute_the_distances_of_trees() {
 
 #[test]
 fn bodies_that_share_points_are_told_to() {
-    let count = sized("CONTACTD_DISTANCE_TREES", 200usize);
+    let count = sized("CONTACTD_DISTANCE_TREES", 100usize);
     let (mut shared, mut missed) = (0, Vec::new());
     for i in 0..count {
         let mut r = Random::new(91_000 + i as u64);

@@ -107,6 +107,8 @@ struct Known {
     /// Their words, and those that a type is declared by.
     words: BTreeSet<String>,
     types: BTreeSet<String>,
+    /// The types that each source declares.
+    declared: BTreeMap<PathBuf, BTreeSet<String>>,
 }
 
 /// Paths of all files and folders below a folder, from the root, by their last names.
@@ -124,6 +126,29 @@ fn paths(folder: &Path, found: &mut BTreeMap<OsString, Vec<PathBuf>>) {
     }
 }
 
+/// The words of a source.
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))
+}
+
+/// The types that a source declares.
+fn types(text: &str) -> BTreeSet<String> {
+    let declares = |word| ["struct", "enum", "trait", "type"].contains(&word);
+    words(text)
+        .zip(words(text).skip(1))
+        .filter(|(before, _)| declares(*before))
+        .map(|(_, name)| name.to_owned())
+        .collect()
+}
+
+/// True for a word that is a type's name, or that of something of a type.
+fn is_type(word: &str) -> bool {
+    let name = word.split("::").next().unwrap_or_default();
+    name.starts_with(|c: char| c.is_ascii_uppercase())
+        && name.contains(|c: char| c.is_ascii_lowercase())
+        && word.chars().all(|c| c.is_ascii_alphanumeric() || c == ':' || c == '_')
+}
+
 impl Known {
     /// What this repository has, read once.
     fn of_this() -> &'static Self {
@@ -139,7 +164,9 @@ impl Known {
             rust_files(&root().join(folder), &mut sources);
         }
         for path in sources {
-            known.sources += &read(&path);
+            let text = read(&path);
+            known.sources += &text;
+            known.declared.insert(path.strip_prefix(root()).unwrap().to_owned(), types(&text));
             let folder = path.parent().unwrap().file_name().unwrap().to_str().unwrap();
             if ["bin", "tests", "examples"].contains(&folder) {
                 known.programs.insert(path.file_stem().unwrap().to_str().unwrap().to_owned());
@@ -147,17 +174,9 @@ impl Known {
                 known.programs.insert(folder.to_owned());
             }
         }
-        let mut before = "";
-        let (mut words, mut types) = (HashSet::new(), HashSet::new());
-        for word in known.sources.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')) {
-            if ["struct", "enum", "trait", "type"].contains(&before) {
-                types.insert(word);
-            }
-            words.insert(word);
-            before = word;
-        }
-        let sorted = |set: HashSet<&str>| set.into_iter().map(str::to_owned).collect();
-        (known.words, known.types) = (sorted(words), sorted(types));
+        let words = words(&known.sources).collect::<HashSet<&str>>();
+        known.words = words.into_iter().map(str::to_owned).collect();
+        known.types = known.declared.values().flatten().cloned().collect();
         known
     }
 
@@ -193,20 +212,47 @@ impl Known {
     /// Whether a word names a type, or something of a type, that is declared nowhere; `None` for other words.
     fn lacks_type(&self, word: &str) -> Option<bool> {
         let (name, item) = word.split_once("::").unwrap_or((word, ""));
-        let is_type = name.starts_with(|c: char| c.is_ascii_uppercase())
-            && name.contains(|c: char| c.is_ascii_lowercase())
-            && word.chars().all(|c| c.is_ascii_alphanumeric() || c == ':' || c == '_');
-        is_type.then(|| !self.types.contains(name) || !item.split("::").all(|part| self.words.contains(part)))
+        is_type(word).then(|| !self.types.contains(name) || !item.split("::").all(|part| self.words.contains(part)))
+    }
+
+    /// Types that a table of the glossary names beside files that do not declare them. A table speaks of the folders that the heading or
+    /// the line "In `folder`" above it names.
+    fn misplaced(&self, text: &str) -> Vec<String> {
+        let mut wrong = Vec::new();
+        let mut folders: Vec<&str> = Vec::new();
+        for (n, line) in prose(text) {
+            if line.starts_with("##") || line.starts_with("In `") {
+                folders = between(line, "`", "`");
+            }
+            let cells: Vec<&str> = line.split(" | ").collect();
+            let [first, _, last] = cells.as_slice() else { continue };
+            let is_in = |path: &Path, end: &str| {
+                let within =
+                    |folder: &&str| format!("{}/", path.parent().unwrap().display()).contains(&format!("/{folder}/"));
+                folders.iter().any(within) && (path.ends_with(end) || path.parent().is_some_and(|p| p.ends_with(end)))
+            };
+            let files = between(last, "`", "`");
+            for name in between(first, "`", "`").into_iter().filter(|word| is_type(word)) {
+                let mut there = self.declared.iter().filter(|(path, _)| files.iter().any(|end| is_in(path, end)));
+                if !folders.is_empty() && !there.any(|(_, types)| types.contains(name)) {
+                    wrong.push(format!("line {n} names {name}, which {} does not declare", files.join(", ")));
+                }
+            }
+        }
+        wrong
     }
 
     /// Paths, tests and programs that a document at `at` names and that are not there; of the glossary, types too.
     fn missing(&self, at: &Path, text: &str) -> Vec<String> {
         let mut wrong = Vec::new();
         let own = written(text);
+        if at.ends_with(GLOSSARY) {
+            wrong.extend(self.misplaced(text));
+        }
         for (n, line) in prose(text) {
             for word in between(line, "`", "`").into_iter().filter(|word| !own.contains(word)) {
-                let is_type = at.ends_with(GLOSSARY) && self.lacks_type(word) == Some(true);
-                if is_type || self.lacks(at, word) == Some(true) {
+                let is_lost = at.ends_with(GLOSSARY) && self.lacks_type(word) == Some(true);
+                if is_lost || self.lacks(at, word) == Some(true) {
                     wrong.push(format!("line {n} names `{word}`, which is not there"));
                 }
             }
@@ -354,6 +400,8 @@ fn a_long_line_a_dead_link_and_a_lost_path_are_seen() {
         .replace("Gone", "NoSuch")
         .replace("_for_good", "Thing");
     assert_eq!(known.missing(&at.with_file_name(GLOSSARY), &words).len(), 2);
+    let table = "### `contact`\n\n| `Task` | what | `task.rs` |\n| `Task`, `Search` | what | `queue/search.rs` |\n";
+    assert_eq!(known.misplaced(table).len(), 1);
     let bad = "`server/src/gone.rs` `gone.rs` `contact/gone` `a_test_that_is_gone_for_good`\n--bin gone, --test gone.\n--test steps laws::\n";
     assert_eq!(known.missing(&at, bad.replace("a_test_that", "a_test_which").as_str()).len(), 7);
 }

@@ -1,6 +1,6 @@
 //! Parts that are attached, detached, moved, given frames and removed in any order stand where matrices of the test's own have them.
 //!
-//! `CONTACTD_ATTACHED=2000 cargo test --release -p contactd-tests --test models attached::` sets the number of random sessions (40).
+//! `CONTACTD_ATTACHED=2000 cargo test --release -p contactd-tests --test models attached::` sets the number of random sessions (20).
 
 use super::load::{one_joint, served};
 use super::robots::{Arm, turn};
@@ -233,14 +233,14 @@ fn play<T: Transport>(session: Session<T>, seed: u64, mut between: impl FnMut(&m
 
 #[test]
 fn what_hangs_on_what_stands_where_matrices_have_it() {
-    for seed in 0..sized("CONTACTD_ATTACHED", 40u64) {
+    for seed in 0..sized("CONTACTD_ATTACHED", 20u64) {
         play(contactd::embedded(&ServerConfig::default()).expect("an engine"), seed, |_, _| {});
     }
 }
 
 #[test]
 fn what_hangs_on_what_stands_where_matrices_have_it_though_commands_are_lost() {
-    for seed in 500..500 + sized("CONTACTD_ATTACHED", 60u64) {
+    for seed in 500..500 + sized("CONTACTD_ATTACHED", 30u64) {
         let left = Rc::new(Cell::new(None));
         let inner = Embedded::new(&ServerConfig::default());
         let session = Session::new(Flaky { inner, left: Rc::clone(&left) }).expect("a session");
@@ -262,7 +262,7 @@ fn what_hangs_on_what_stands_where_matrices_have_it_though_commands_are_lost() {
 fn what_hangs_on_what_is_known_to_a_successor_of_the_server() {
     let base = tempfile::Builder::new().prefix("c").tempdir_in("/dev/shm").expect("a folder");
     served(base.path(), "chain", |address| {
-        for seed in 100..104 {
+        for seed in 100..100 + sized("CONTACTD_ATTACHED", 20u64).div_ceil(20) {
             play(Session::connect_to(address.clone()).expect("a session"), seed, |session, k| {
                 if k % 5 == 0 {
                     session.reconnect(PATIENCE).unwrap_or_else(|e| panic!("{e}"));

@@ -1,6 +1,6 @@
 //! Queries of one scene, each against a session that was made for it: whatever was asked before, on however many threads.
 //!
-//! `CONTACTD_BATCH=20000 cargo test --release -p contactd-tests --test models batch::` sets the number of queries (200 by default).
+//! `CONTACTD_BATCH=20000 cargo test --release -p contactd-tests --test models batch::` sets the number of queries (100 by default).
 
 use contactd::batch::{Answers, Batch, BatchOptions, Row};
 use contactd::import::{Facets, Scene};
@@ -138,7 +138,7 @@ fn alone(objects: &Objects, records: &[PoseRecord], options: &BatchOptions) -> R
 #[test]
 fn each_query_has_the_bits_of_a_session_that_was_made_for_it() {
     let folder = tempfile::tempdir().unwrap();
-    let all = sized("CONTACTD_BATCH", 200);
+    let all = sized("CONTACTD_BATCH", 100);
     let (mut r, mut asked, mut refused, mut met, mut limited) = (Random::new(12), 0, 0, 0, 0);
     while asked < all {
         let objects = objects(&mut r);

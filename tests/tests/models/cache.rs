@@ -64,7 +64,7 @@ fn the_projects_models_come_back_bit_for_bit() {
 fn random_solids_come_back_and_answer_as_before() {
     let mut r = Random::new(71);
     let mut met = 0;
-    let count = sized("CONTACTD_TREES", 20);
+    let count = sized("CONTACTD_TREES", 10);
     for i in 0..count {
         let models = [1 + i % 4, 1 + i % 3].map(|depth| Model::new(solid(&mut r, depth)));
         let back = models.each_ref().map(|m| kept(m, &[]));

@@ -1,7 +1,7 @@
 //! Frames of SDFormat: random graphs of them, in worlds, models, models within models and included files, against matrices that were
 //! drawn beside the text.
 //!
-//! `CONTACTD_FRAMES=5000 cargo test --release -p contactd-tests --test models frames::` sets the number of random worlds (60 by default).
+//! `CONTACTD_FRAMES=5000 cargo test --release -p contactd-tests --test models frames::` sets the number of random worlds (30 by default).
 
 use super::robots::{Maker, frame, models, read, turn, words};
 use contactd::import::robot::{Ask, DofKind, Robot, Values, read_robot, scene_of};
@@ -276,7 +276,7 @@ fn frames_are_where_matrices_have_them() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut r = Random::new(77);
     let (mut links, mut moved, mut followed, mut worst) = (0, 0, 0, 0.0_f64);
-    for k in 0..sized("CONTACTD_FRAMES", 60usize) {
+    for k in 0..sized("CONTACTD_FRAMES", 30usize) {
         let mut maker = Maker::new(&mut r, folder.path());
         let made = maker.scope(0);
         let text = format!("<sdf version=\"1.11\"><world name=\"w\">\n{}\n</world></sdf>", made.text.join("\n"));

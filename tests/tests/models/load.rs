@@ -1,7 +1,7 @@
 //! Scenes and robots that are loaded into sessions: what `contactd check` says of their steps, to the bit, embedded and served; links
 //! stand where matrices of the test's own have them; parts that are attached go along, as one solid with what carries them.
 //!
-//! `CONTACTD_LOADED=300 cargo test --release -p contactd-tests --test models load::` sets the number of random arms and grippers (15).
+//! `CONTACTD_LOADED=300 cargo test --release -p contactd-tests --test models load::` sets the number of random arms and grippers (6).
 
 use super::robots::{Arm, read};
 use bytemuck::bytes_of;
@@ -187,7 +187,7 @@ fn an_arm_in_a_session_answers_as_check_does_and_stands_where_matrices_have_it()
     let base = tempfile::Builder::new().prefix("c").tempdir_in("/dev/shm").expect("a folder");
     let (mut moved, mut slots) = (0, 0);
     served(base.path(), "loads", |address| {
-        for k in 0..sized("CONTACTD_LOADED", 15u64) {
+        for k in 0..sized("CONTACTD_LOADED", 6u64) {
             let arm = Arm::random(&mut r);
             let mut text = arm.urdf();
             if r.chance(0.4) {
@@ -211,7 +211,7 @@ fn an_arm_in_a_session_answers_as_check_does_and_stands_where_matrices_have_it()
         }
     });
     println!("{slots} slots are equal");
-    assert!(moved > 10 && slots > 50, "{moved} {slots}");
+    assert!(moved > 3 && slots > 20, "{moved} {slots}");
 }
 
 #[test]
@@ -360,7 +360,7 @@ fn what_is_attached_goes_along_as_one_solid_with_its_gripper() {
     let mut r = Random::new(5);
     let base = tempfile::Builder::new().prefix("c").tempdir_in("/dev/shm").expect("a folder");
     let (mut met, mut worst) = (0, 0.0_f64);
-    for k in 0..sized("CONTACTD_LOADED", 15u64) {
+    for k in 0..sized("CONTACTD_LOADED", 6u64) {
         let grip = Grip::random(&mut r);
         let new = || contactd::embedded(&ServerConfig::default()).expect("an engine");
         let one = meets(&mut new(), &grip, true, |_, _| {});
@@ -390,13 +390,13 @@ fn what_is_attached_goes_along_as_one_solid_with_its_gripper() {
         }
     }
     println!("{met} contacts, times at most {worst:.1e} apart");
-    assert!(met > 15 && worst < 1e-9, "{met} {worst:e}");
+    assert!(met > 6 && worst < 1e-9, "{met} {worst:e}");
 }
 
 #[test]
 fn pairs_that_are_allowed_or_attached_are_not_tested_and_all_others_are() {
     let mut r = Random::new(77);
-    for _ in 0..sized("CONTACTD_LOADED", 15u64) {
+    for _ in 0..sized("CONTACTD_LOADED", 6u64) {
         let mut session = contactd::embedded(&ServerConfig::default()).expect("an engine");
         let model = session.load_model("ball", &sphere(1.0)).expect("a ball").id;
         let n = 3 + r.below(4);

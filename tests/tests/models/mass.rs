@@ -96,7 +96,8 @@ fn agree(a: &MassProperties, b: &MassProperties, slack: f64, what: &str) {
 fn closed_forms_agree_with_boxes_under_any_pose() {
     let mut r = Random::new(5);
     let mut by_boxes = 0;
-    for i in 0..60 {
+    let count = 6 * sized("CONTACTD_TREES", 4);
+    for i in 0..count {
         let shape = match i % 6 {
             0 => Sphere { radius: r.within(0.3, 2.0) }.into(),
             1 => Cylinder { radius: r.within(0.3, 2.0), half_height: r.within(0.1, 2.0) }.into(),
@@ -119,7 +120,7 @@ fn closed_forms_agree_with_boxes_under_any_pose() {
         let rays = of_integrals(&integrals(&solid, &solid.aabb(), 150));
         agree(&exact, &rays, 3e-3, &format!("{shape:?} by rays"));
     }
-    assert!(by_boxes > 30, "{by_boxes} with curved faces");
+    assert!(2 * by_boxes > count, "{by_boxes} with curved faces");
 }
 
 #[test]
@@ -134,7 +135,7 @@ fn what_has_planes_alone_is_exact_but_for_rounding() {
     assert!((hollow.volume - 37.0).abs() <= hollow.volume_error && hollow.volume_error < 1e-9);
     assert!((hollow.inertia[0] - (64.0 * 16.0 - 27.0 * 9.0) / 6.0).abs() <= hollow.inertia_error[0]);
     let mut r = Random::new(8);
-    for _ in 0..sized("CONTACTD_TREES", 4) {
+    for _ in 0..sized("CONTACTD_TREES", 2) {
         let shapes = [4, 6, 8, 12, 20].map(|n| Polyhedron::platonic(n, 1.0).expect("a platonic count"));
         let parts: Vec<(Shape, Pose)> =
             (0..3).map(|_| (shapes[r.below(5)].clone().into(), Pose::new(r.vector(0.4), r.rotation()))).collect();
@@ -185,7 +186,7 @@ fn bounds_are_true_where_the_volume_is_known() {
 fn bounds_are_true_for_random_trees() {
     let mut r = Random::new(2);
     let (mut reported, mut empty) = (0, 0);
-    let count = sized("CONTACTD_TREES", 5);
+    let count = sized("CONTACTD_TREES", 3);
     for i in 0..count {
         let solid: Solid = solid(&mut r, 1 + i % 3);
         let around = solid.aabb();

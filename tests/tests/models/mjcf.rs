@@ -1,7 +1,7 @@
 //! MJCF: random trees of bodies with copies, classes of defaults, constraints of joints and keyframes, cut into files that include each
 //! other, against matrices and filters of the test's own.
 //!
-//! `CONTACTD_MJCF=3000 cargo test --release -p contactd-tests --test models mjcf::` sets the number of random models (60 by default).
+//! `CONTACTD_MJCF=3000 cargo test --release -p contactd-tests --test models mjcf::` sets the number of random models (30 by default).
 
 use super::robots::{Maker, frame, models, read, turn, words};
 use contactd::import::robot::{Ask, Values, read_robot, scene_of};
@@ -210,7 +210,7 @@ fn bodies_are_where_matrices_have_them_and_pairs_are_filtered() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut r = Random::new(31);
     let (mut bodies, mut pairs, mut coupled, mut worst) = (0, 0, 0, 0.0_f64);
-    for k in 0..sized("CONTACTD_MJCF", 60usize) {
+    for k in 0..sized("CONTACTD_MJCF", 30usize) {
         let mut maker = Maker::new(&mut r, folder.path());
         let numbers = |r: &mut Random, n: usize| (0..n).map(|_| r.within(0.1, 0.5)).collect::<Vec<f64>>();
         let main = numbers(maker.r, 3);

@@ -2,7 +2,7 @@
 //! and nothing of boxes, solids or places.
 //!
 //! `CONTACTD_OPENMC=2000 CONTACTD_OPENMC_SEED=1 cargo test --release -p contactd-tests --test models openmc:: -- --nocapture` sets the number of
-//! random geometries (12 by default) and where they begin.
+//! random geometries (6 by default) and where they begin.
 
 use contactd::import::openmc::read_openmc;
 use contactd::import::{Facets, Limits, Scene};
@@ -519,7 +519,7 @@ fn what_random_points_find_is_told_and_nothing_that_is_not_there() {
     let path = folder.path().join("geometry.xml");
     let first: u64 = sized("CONTACTD_OPENMC_SEED", 1);
     let (mut sampled, mut reported, mut clean, mut open, mut pairs) = (0, 0, 0, 0, 0);
-    let count = sized("CONTACTD_OPENMC", 12_u64);
+    let count = sized("CONTACTD_OPENMC", 6_u64);
     for seed in first..first + count {
         let mut r = Random::new(seed);
         let mut g = Geometry::random(&mut r);
@@ -747,7 +747,7 @@ fn overlaps_and_gaps_of_a_known_depth_are_found_and_no_others() {
     let path = folder.path().join("model.xml");
     let mut r = Random::new(sized("CONTACTD_OPENMC_SEED", 1_u64));
     let (mut all, mut right, mut least) = (0, 0, f64::INFINITY);
-    for k in 0..sized("CONTACTD_OPENMC", 20_u64).div_ceil(4) {
+    for k in 0..sized("CONTACTD_OPENMC", 8_u64).div_ceil(4) {
         let (columns, rows) = (2 + r.below(6), 2 + r.below(4));
         let (mut surfaces, mut cells) = (String::new(), String::new());
         let mut planted = BTreeMap::new();

@@ -10,6 +10,7 @@ use contactd_client::{Object, Session};
 use contactd_proto::Pose;
 use contactd_proto::query::{ObjectRay, RayOutcome as Outcome, Side};
 use contactd_tests::models::simple;
+use contactd_tests::sweep::sized;
 use glam::{DVec2, DVec3};
 
 const RAYS: RayOptions = RayOptions { depth: 0.0, limit: DEFAULT_LIMIT };
@@ -97,7 +98,7 @@ fn the_nearest_of_bodies_far_away_is_told() {
 fn points_far_above_rims_are_bracketed() {
     let mut r = Random(20);
     let (mut asked, mut settled) = (0, 0);
-    for _ in 0..12 {
+    for _ in 0..sized("CONTACTD_PROBE_WORLDS", 4usize) {
         let (radius, height) = (r.within(0.3, 1.0), r.within(0.2, 0.6));
         let text = format!("cylinder(r1 = {radius:?}, r2 = 0, h = {height:?});");
         let mut session = of(&text);

@@ -55,7 +55,7 @@ fn a_ball_that_is_all_that_is_left_of_a_tree_is_told_without_a_cell() {
 
 #[test]
 fn what_is_told_in_front_of_the_search_is_what_the_search_says() {
-    let count = sized("CONTACTD_FRONTS", 200_u64);
+    let count = sized("CONTACTD_FRONTS", 100_u64);
     let all: Vec<([bool; 2], bool, Option<String>)> = (0..count)
         .into_par_iter()
         .map(|i| {
@@ -118,7 +118,7 @@ fn lowest(scene: &Scene, ball: usize, t: f64, r: &mut Random) -> f64 {
 
 #[test]
 fn no_point_of_a_ball_lies_in_a_solid_before_they_are_told_to_meet() {
-    let count = sized("CONTACTD_FRONTS", 200_u64);
+    let count = sized("CONTACTD_FRONTS", 100_u64);
     let told: usize = (0..count)
         .into_par_iter()
         .map(|i| {

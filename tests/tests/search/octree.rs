@@ -156,6 +156,8 @@ fn combined_kinds_agree_with_dense_sampling_in_every_cell() {
         let right = node(&mut Random::new(seed * 2 + 1), &mut builder, 2, 1.0, false);
         let root = builder.operation(op, &[left, right]);
         let both = builder.finish(root);
+        // Bounds without the downward rule's help from the whole: the operands' own.
+        let [bounds_a, bounds_b, bounds] = [&a, &b, &both].map(|solid| SBounds::new(solid, 0.0));
         let mut r = Random::new(seed + 77);
         for _ in 0..40 {
             // Half of the voxels where both surfaces are, or the rarer kinds never meet.
@@ -170,9 +172,8 @@ fn combined_kinds_agree_with_dense_sampling_in_every_cell() {
                 let mut c = Classifier { solid: s, bounds, center, half, work: 0 };
                 (c.classify(&terms, &mut out, &mut refs).kind, refs)
             };
-            // Bounds without the downward rule's help from the whole: the operands' own.
-            let (ka, kb) = (classify(&a, &SBounds::new(&a, 0.0)).0, classify(&b, &SBounds::new(&b, 0.0)).0);
-            let (k, refs) = classify(&both, &SBounds::new(&both, 0.0));
+            let (ka, kb) = (classify(&a, &bounds_a).0, classify(&b, &bounds_b).0);
+            let (k, refs) = classify(&both, &bounds);
             let table = combine(op, ka, kb).map(|k| if k == NodeKind::Grey { NodeKind::Mixed } else { k });
             seen[seed as usize % 3][ka as usize][kb as usize] += 1;
             // The bounds of the whole tree clip the operands' own, so that it sees less of them: sharper as a rule.

@@ -1,6 +1,6 @@
 //! Round faces near each other take few cells: what a fit with equally steep weights bounds, and what a small overlap has in common.
 //!
-//! 200 random scenes a test here; for more
+//! 80 random scenes a test here; for more
 //! `CONTACTD_ROUND=20000 cargo test -p contactd-tests --test search round_faces:: -- --nocapture`.
 
 use contactd::contact::{Status, Verdict};
@@ -54,7 +54,7 @@ impl Seat {
 fn a_ball_comes_down_in_a_cone() {
     let mut r = Random::new(0x0063_6f6e_6573);
     let (mut cells, mut most) = (0, 0);
-    let count = sized("CONTACTD_ROUND", 200_usize);
+    let count = sized("CONTACTD_ROUND", 80_usize);
     for i in 0..count {
         let gap = 10f64.powf(r.within(-7.0, -1.0));
         let seat = Seat::random(&mut r, gap);
@@ -75,7 +75,7 @@ fn a_ball_comes_down_in_a_cone() {
 fn a_small_overlap_at_the_start_is_told_with_its_depth_by_few_cells() {
     let mut r = Random::new(0x0064_6565_7073);
     let (mut cells, mut most) = (0, 0);
-    let count = sized("CONTACTD_ROUND", 200_usize);
+    let count = sized("CONTACTD_ROUND", 80_usize);
     for i in 0..count {
         let depth = 10f64.powf(r.within(-7.0, -2.0));
         let seat = Seat::random(&mut r, -depth);

@@ -1,6 +1,6 @@
 //! Cells that are made smaller before they are bounded change no answer, and leave fewer cells.
 //!
-//! 300 random scenes here; for more
+//! 60 random scenes here; for more
 //! `CONTACTD_TIGHTEN=100000 cargo test -p contactd-tests --test search tighten:: -- --nocapture`.
 
 use contactd::contact::{Status, Strategies};
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 #[test]
 fn smaller_cells_change_no_answer_and_are_fewer() {
-    let count = sized("CONTACTD_TIGHTEN", 100_u64);
+    let count = sized("CONTACTD_TIGHTEN", 60_u64);
     let all: Vec<([u64; 2], bool, Option<String>)> = (0..count)
         .into_par_iter()
         .map(|i| {

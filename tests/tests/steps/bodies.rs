@@ -399,7 +399,7 @@ fn answer(out: &contactd::world::StepOutcome) -> Vec<(u32, u32, String, u64)> {
 
 #[test]
 fn bodies_stand_where_one_after_the_other_would_and_refused_batches_move_none() {
-    let games = sized("CONTACTD_BODY_STEPS", 4_000usize).div_ceil(STEPS) as u64;
+    let games = sized("CONTACTD_BODY_STEPS", 1_500usize).div_ceil(STEPS) as u64;
     let play = |seed| {
         let mut game = Game::new(seed);
         (0..STEPS).for_each(|k| game.step(k % 5 == 4));
@@ -423,6 +423,6 @@ fn bodies_stand_where_one_after_the_other_would_and_refused_batches_move_none() 
         ErrorCode::Declaration,
     ];
     for code in codes.map(|code| code.sentence()).into_iter().chain(["accepted", "compared"]) {
-        assert!(seen.get(code).is_some_and(|n| *n >= 10), "{code}: too few to say anything: {seen:?}");
+        assert!(seen.get(code).is_some_and(|n| *n >= 4), "{code}: too few to say anything: {seen:?}");
     }
 }

@@ -141,7 +141,7 @@ fn run(seed: u64) -> Work {
 
 #[test]
 fn what_is_remembered_changes_no_bit_of_an_answer() {
-    let count = sized("CONTACTD_COHERENT_SCENES", 60);
+    let count = sized("CONTACTD_COHERENT_SCENES", 30);
     let all: Vec<Work> = (0..count).into_par_iter().map(|i| run(7_000_001 + i)).collect();
     let sum = |f: fn(&Work) -> usize| all.iter().map(f).sum::<usize>();
     let (steps, contacts, clear, known) = (sum(|w| w.steps), sum(|w| w.contacts), sum(|w| w.clear), sum(|w| w.known));

@@ -13,13 +13,17 @@ use contactd_tests::scenes::{Recipe, Scene};
 use contactd_tests::sweep::sized;
 use glam::DVec3;
 
-/// Lanes of each class, and copies of each lane.
+/// Lanes of each class.
 const LANES: usize = 9;
-const COPIES: usize = 8;
 
-/// Lanes of each class where every share of the pairs asks: `CONTACTD_LANES=9` is the long form.
+/// Lanes of each class where each effect has its own scenes: `CONTACTD_LANES=9` is the long form.
 fn few() -> usize {
     sized("CONTACTD_LANES", 3)
+}
+
+/// Copies of each lane, of which a share asks: quarters of them, eighths in the long form.
+fn copies() -> usize {
+    if std::env::var_os("CONTACTD_LANES").is_some() { 8 } else { 4 }
 }
 
 fn value(counts: &[(&'static str, u64)], name: &str) -> u64 {
@@ -31,12 +35,12 @@ fn value(counts: &[(&'static str, u64)], name: &str) -> u64 {
 #[test]
 fn an_effect_that_no_pair_asks_for_costs_nothing() {
     for effect in &EFFECTS {
-        let lanes = effect.class.lanes(LANES);
-        let none = counts(effect.lanes(&lanes, (0, COPIES)).step());
-        let out = Lanes::shared(&lanes, (0, COPIES), &[rule(PLAIN, effect.plain)]).step().clone();
+        let lanes = effect.class.lanes(few());
+        let none = counts(effect.lanes(&lanes, (0, copies())).step());
+        let out = Lanes::shared(&lanes, (0, copies()), &[rule(PLAIN, effect.plain)]).step().clone();
         assert_eq!(none, counts(&out), "{}: declared, and not known of", effect.name);
         assert_eq!((effect.counter)(&out.effect_counters), 0, "{}", effect.name);
-        let counted = (effect.counter)(&effect.lanes(&lanes, (0, COPIES)).step().effect_counters);
+        let counted = (effect.counter)(&effect.lanes(&lanes, (0, copies())).step().effect_counters);
         assert_eq!(counted, 0, "{}", effect.name);
     }
 }
@@ -44,15 +48,16 @@ fn an_effect_that_no_pair_asks_for_costs_nothing() {
 /// Every count of a step is straight in the share of the pairs that ask for the effect, to the last one.
 #[test]
 fn the_cost_of_an_effect_is_straight_in_the_pairs_that_ask_for_it() {
+    let copies = copies();
     for effect in &EFFECTS {
         let lanes = effect.class.lanes(few());
-        let at = |k: usize| counts(effect.lanes(&lanes, (k, COPIES)).step());
-        let (none, all) = (at(0), at(COPIES));
+        let at = |k: usize| counts(effect.lanes(&lanes, (k, copies)).step());
+        let (none, all) = (at(0), at(copies));
         assert!(none != all, "{}: the effect does something", effect.name);
-        for k in 1..COPIES {
+        for k in 1..copies {
             for (i, (name, count)) in at(k).into_iter().enumerate() {
-                let line = (COPIES - k) as u64 * none[i].1 + k as u64 * all[i].1;
-                assert_eq!(COPIES as u64 * count, line, "{}: {name} with {k} of {COPIES}", effect.name);
+                let line = (copies - k) as u64 * none[i].1 + k as u64 * all[i].1;
+                assert_eq!(copies as u64 * count, line, "{}: {name} with {k} of {copies}", effect.name);
             }
         }
     }
@@ -64,8 +69,8 @@ fn the_cost_of_an_effect_is_straight_in_the_pairs_that_ask_for_it() {
 fn an_effect_that_all_pairs_ask_for_costs_the_effect_alone() {
     for effect in &EFFECTS {
         let lanes = effect.class.lanes(few());
-        let all = counts(effect.lanes(&lanes, (COPIES, COPIES)).step());
-        let alone = counts(Lanes::shared(&lanes, (0, COPIES), &[rule(PLAIN, effect.on)]).step());
+        let all = counts(effect.lanes(&lanes, (copies(), copies())).step());
+        let alone = counts(Lanes::shared(&lanes, (0, copies()), &[rule(PLAIN, effect.on)]).step());
         assert_eq!(all, alone, "{}", effect.name);
         assert!((effect.counter)(&effect.lanes(&lanes, (1, 1)).step().effect_counters) > 0, "{}", effect.name);
     }
@@ -76,7 +81,7 @@ fn an_effect_that_all_pairs_ask_for_costs_the_effect_alone() {
 #[test]
 fn effects_of_bystanders_cost_the_others_nothing() {
     for class in Class::ALL {
-        let lanes = class.lanes(LANES);
+        let lanes = class.lanes(few());
         let with = |rules: &[Rule]| {
             let mut scene = Lanes::shared(&lanes, (0, 1), rules);
             for effect in &EFFECTS {
@@ -160,7 +165,7 @@ fn a_margin_costs_what_its_tests_cost() {
 #[test]
 fn each_rung_adds_its_own_work_and_takes_none_away() {
     for class in Class::ALL {
-        let lanes = class.lanes(LANES);
+        let lanes = class.lanes(few());
         let at = |report, penetration| {
             let mut scene = Lanes::all(&lanes, |r| (r.report, r.penetration) = (report, penetration));
             let out = scene.step();

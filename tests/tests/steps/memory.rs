@@ -29,7 +29,7 @@ fn unproven(all: &[Work]) -> String {
 
 /// Steps of the random plays.
 fn steps() -> usize {
-    sized("CONTACTD_MEMORY_STEPS", 2_000)
+    sized("CONTACTD_MEMORY_STEPS", 800)
 }
 
 #[test]
@@ -67,6 +67,8 @@ fn random_steps_are_told_as_by_a_session_that_never_saw_a_step() {
     }
     assert!(refused.is_empty(), "{} certificates do not hold: {}", refused.len(), refused[0]);
     assert!(differences.is_empty(), "{} of {plays} plays: {}", differences.len(), differences[0]);
+    let left: usize = all.iter().flat_map(|w| w.unproven).sum();
+    assert!(left * 100 <= proven.iter().sum(), "{left} answers of memory have no certificate");
     assert!(unshown * 500 <= proven[2] + proven[3], "{unshown} certificates are not shown");
     let steps = sum(|w| w.steps);
     assert!(sum(|w| w.contacts) * 20 > steps && sum(|w| w.clear) * 5 > steps, "too few of a kind to say anything");
@@ -378,7 +380,7 @@ fn what_hovers_at_a_margin_by_its_sharp_edges_is_told_as_by_a_new_session() {
     println!("{within} steps within the margin, {outside} out of it, {known} without a search");
     let steps = 8 * hovering() as usize;
     assert!(
-        within * 10 > steps && outside * 10 > steps && known * 10 > steps,
+        within * 12 > steps && outside * 10 > steps && known * 10 > steps,
         "{within}, {outside}, {known} of {steps}"
     );
 }

@@ -50,7 +50,7 @@ pub struct Pruned {
 
 /// The collision region of a pair.
 #[derive(Clone, Debug)]
-pub struct Region {
+pub struct CollisionRegion {
     /// What of A can take part.
     pub a: Pruned,
     /// What of B can take part.
@@ -60,7 +60,7 @@ pub struct Region {
 /// Locates the collision region of a pair over [t0, t1] of its step; `None` when they cannot come closer than `margin`
 /// to a common point (max(f_A, f_B) > margin everywhere). `margin` (a length) may not exceed the margin of either
 /// side's bounds, otherwise those are taken anew for it.
-pub fn locate(a: &Side, b: &Side, t0: f64, t1: f64, margin: f64) -> Option<Region> {
+pub fn locate(a: &Side, b: &Side, t0: f64, t1: f64, margin: f64) -> Option<CollisionRegion> {
     let wide =
         |s: &Side| (margin > s.bounds.margin()).then(|| SBounds::with_volumes(s.solid, margin, s.bounds.volumes()));
     let (wide_a, wide_b) = (wide(a), wide(b));
@@ -90,7 +90,7 @@ pub fn locate(a: &Side, b: &Side, t0: f64, t1: f64, margin: f64) -> Option<Regio
         }
         _ => settled(&sides, boxes, clipped)?,
     };
-    Some(Region { a: Pruned::within(a.solid, bounds_a, box_a)?, b: Pruned::within(b.solid, bounds_b, box_b)? })
+    Some(CollisionRegion { a: Pruned::within(a.solid, bounds_a, box_a)?, b: Pruned::within(b.solid, bounds_b, box_b)? })
 }
 
 /// What is left of both trees once each has clipped the other, in turn, until neither shrinks; `None` when nothing is.

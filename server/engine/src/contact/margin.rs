@@ -104,7 +104,7 @@ pub fn direction_of_clearance(query: &PairQuery) -> Option<DVec3> {
 }
 
 /// What proves that a pair keeps a distance over a motion, as `keep` has found out.
-pub enum Distance {
+pub enum KeptProof {
     /// Of two convex primitives: directions, from a to b in world axes, each from its time (fraction of the motion) on.
     Directions(Vec<(f64, DVec3)>),
     /// Of others cells at a negative depth.
@@ -114,17 +114,17 @@ pub enum Distance {
 /// The proof that a pair keeps a distance until `until` over the query's motion: one in which bodies displaced together by `way`
 /// are farther than their touching distance apart, where `keep` has proven as much for `clearance`, which is more. `None` where it
 /// takes more cells than the query allows, or the two are too near each other to leave a checker clearance.
-pub fn certify_kept(query: &PairQuery, margin: f64, (way, clearance): (f64, f64), until: f64) -> Option<Distance> {
+pub fn certify_kept(query: &PairQuery, margin: f64, (way, clearance): (f64, f64), until: f64) -> Option<KeptProof> {
     let (task, swapped) = Task::of(query);
     let touch = touch(&task, margin);
     if let Some(pair) = ConvexPair::new(task) {
         let sign = if swapped { -1.0 } else { 1.0 };
         let all = pair.directions(clearance + touch + 8.0 * task.rounding);
-        return Some(Distance::Directions(all.into_iter().map(|(t, n)| (t, n * sign)).collect()));
+        return Some(KeptProof::Directions(all.into_iter().map(|(t, n)| (t, n * sign)).collect()));
     }
     let [needed, proven] = [way, clearance].map(|d| 0.5 * (d + touch));
     let spare = proven - needed;
-    certificate::certify_level(query, needed + 0.1 * spare, needed + 0.9 * spare, until).map(Distance::Cells)
+    certificate::certify_level(query, needed + 0.1 * spare, needed + 0.9 * spare, until).map(KeptProof::Cells)
 }
 
 /// Until when a pair keeps its surfaces a distance apart that leaves `clearance` (a length) for displacements, or as much of it

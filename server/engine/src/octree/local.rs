@@ -72,7 +72,7 @@ pub fn whole(solid: &Solid, bounds: &SBounds) -> Vec<Term> {
 /// What `classify` knows of a local tree over a voxel.
 #[derive(Clone, Copy, Debug)]
 pub struct Local {
-    /// NodeKind at the lowest level: never grey.
+    /// At the lowest level: never grey.
     pub kind: NodeKind,
     /// Lower bound of f, meaningful up to the margin.
     pub lo: f64,
@@ -97,7 +97,7 @@ pub struct Classifier<'a> {
 const EMPTY: Local = Local { kind: NodeKind::Empty, lo: f64::INFINITY, hi: f64::INFINITY };
 
 impl Classifier<'_> {
-    /// NodeKind of the voxel for the tree at the head of `terms`. Appends to `out` what is left of it unless it is full or
+    /// Kind of the voxel for the tree at the head of `terms`. Appends to `out` what is left of it unless it is full or
     /// empty, and to `refs` the primitives the kind refers to.
     pub fn classify(&mut self, terms: &[Term], out: &mut Vec<Term>, refs: &mut Vec<u32>) -> Local {
         let Some(head) = terms.first() else { return EMPTY };

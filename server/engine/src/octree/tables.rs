@@ -9,7 +9,7 @@
 
 use crate::solid::Op;
 
-/// NodeKind of an octree node.
+/// What an octree node is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum NodeKind {
     /// Inner node with eight children.
@@ -111,7 +111,7 @@ pub const COLLISION: Cells<Meet> = [
     [  B,   A,   S,   A, A, A ], // mixed
 ];
 
-/// NodeKind of `a op b`; `None` where the paper says it cannot occur.
+/// The kind of `a op b`; `None` where the paper says it cannot occur.
 pub fn combine(op: Op, a: NodeKind, b: NodeKind) -> Option<NodeKind> {
     match op {
         Op::Union => UNION[a as usize][b as usize],

@@ -3,7 +3,9 @@
 //! M. Zeiller 1993. A pair of nodes that can meet within the step (`approach`), inside the collision region of stage 1,
 //! is skipped, decomposed or turned into candidates as table 4 says: *branches* decompose the larger node, or the one
 //! that can be; *pairs* name primitives. Each pair of surfaces is named once, an n-surface together with the positive
-//! primitive of its volume: p-pairs (two positive surfaces), n-pairs (one complemented), nn-pairs (two).
+//! primitive of its volume: p-pairs (two positive surfaces), n-pairs (one complemented), nn-pairs (two). The search goes
+//! down with a queue of its own (`root`, `next`, `timed`) and makes cells of what it ends at (`contact/queue/slices`); the pairs are
+//! the paper's list, for tests.
 //!
 //! Mixed leaves are decomposed further down to `Detail::finest`: an octree becomes finer where contacts happen. The walk
 //! stops decomposing after `Detail::node_pairs` pairs; a grey node that is left then names, like a mixed one, the
@@ -16,7 +18,7 @@ use super::Model;
 use super::approach::Approach;
 use super::nodes::Node;
 use super::tables::{Meet, NodeKind, meet};
-use crate::bound::{Pruned, Region};
+use crate::bound::{CollisionRegion, Pruned};
 use crate::motion::{Instant, Placed};
 use crate::solid::{Sense, Solid};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -127,7 +129,7 @@ pub struct Walk<'m> {
     a: &'m Model,
     b: &'m Model,
     approach: Approach,
-    region: Option<Arc<Region>>,
+    region: Option<Arc<CollisionRegion>>,
     margin: f64,
     detail: Detail,
 }
@@ -138,7 +140,7 @@ impl<'m> Walk<'m> {
     pub fn new(
         (a, pa): (&'m Model, Placed),
         (b, pb): (&'m Model, Placed),
-        region: Option<Arc<Region>>,
+        region: Option<Arc<CollisionRegion>>,
         margin: f64,
         detail: Detail,
     ) -> Self {

@@ -1,6 +1,7 @@
 //! What is known of a pair from earlier steps, so that the next one need not be searched.
 //!
-//! Three kinds of knowledge, each a proof, the cheapest first:
+//! Of the five proofs of docs/algorithm/coherence.md three stand here, the cheapest first; neighbours and directions are in
+//! `neighbours` and `swept_shapes`. *Clearance* is the gap of that page here, not the effect of that name:
 //! * clearance: apart by that much when it was measured. While the ways that both bodies have gone since (their path lengths)
 //!   stay below it they cannot meet: one comparison (`neighbours`);
 //! * a predicted motion: both bodies were proven to keep a distance if they go on as they went. While their true motions stray from

@@ -12,7 +12,7 @@ use super::notes::{Clearance, Decided, axis_between};
 use super::scene::World;
 use super::search::{self, PairJob};
 use crate::contact::certificate::{self, Certificate};
-use crate::contact::margin::{self, Distance};
+use crate::contact::margin::{self, KeptProof};
 use crate::contact::{self, Outcome, PairQuery, QueryOptions, Region, Scratch, Status, region};
 use crate::motion::Placed;
 use contactd_proto::{Motion, Pose};
@@ -173,12 +173,12 @@ impl World {
                 motions.iter().for_each(|m| write_motion(&mut out, m));
                 out.push('\n');
                 match proof {
-                    Distance::Directions(all) => {
+                    KeptProof::Directions(all) => {
                         for (t, n) in all {
                             let _ = writeln!(out, "from {t:e} {}", numbers(&[n]));
                         }
                     }
-                    Distance::Cells(proof) => write_cells(&proof, &mut out),
+                    KeptProof::Cells(proof) => write_cells(&proof, &mut out),
                 }
             }
             // Of a search past an overlap nothing is proven that two certificates could say.

@@ -1,7 +1,7 @@
 //! Outcomes as 128-byte slots: what the pair's plan asks for, everything else zero with its `valid` bit clear.
 //!
 //! Behind the records stand their further slots, pair by pair: the detail slot where asked for, then for each region its
-//! own slot and the points that bound it, four a slot.
+//! own slot and the points that bound it, four a slot, and last the clearance slot.
 
 use super::outcome::{PairOutcome, StepOutcome};
 use super::scene::World;

@@ -85,7 +85,7 @@ fn rounds(few: u64) -> u64 {
 
 #[test]
 fn random_meshes_that_cross_themselves_are_what_they_wind_around() {
-    let rounds = rounds(5);
+    let rounds = rounds(2);
     let mut counts = [[0; 4]; 7];
     for seed in 0..rounds {
         let mut r = Random(1 + seed * 77);
@@ -114,7 +114,8 @@ fn random_meshes_that_cross_themselves_are_what_they_wind_around() {
 #[test]
 fn boxes_on_a_grid_have_the_volume_of_the_cubes_that_they_wind_around() {
     let mut wound = 0;
-    for seed in 0..60 {
+    let count = rounds(24);
+    for seed in 0..count {
         let mut r = Random(5 + seed);
         let (mut soup, mut cubes) = (Soup::default(), [0i32; 512]);
         for _ in 0..2 + seed % 4 {
@@ -137,7 +138,7 @@ fn boxes_on_a_grid_have_the_volume_of_the_cubes_that_they_wind_around() {
         let (volume, cubes) = (mesh.moments().map_or(0.0, |m| m.volume()), cubes.iter().filter(|c| **c != 0).count());
         assert!((volume - cubes as f64).abs() < 1e-9, "seed {seed}: {volume}, not {cubes}");
     }
-    assert!(wound > 25, "{wound}");
+    assert!(5 * wound as u64 > 2 * count, "{wound} of {count}");
 }
 
 #[test]

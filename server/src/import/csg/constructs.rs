@@ -511,7 +511,7 @@ fn outlines_of_very_many_corners_hold_what_their_sectors_say() {
     let rounds = std::env::var("CONTACTD_OUTLINES").ok().and_then(|n| n.parse().ok());
     for round in 0..rounds.unwrap_or(3_usize) {
         // Every third is convex: of it all sides are on the hull.
-        let n = if rounds.is_some() { 50_000 } else { 5_000 };
+        let n = if rounds.is_some() { 50_000 } else { 2_500 };
         let ring = if round % 3 == 2 {
             let at = |i: usize| (std::f64::consts::TAU * i as f64 / n as f64).sin_cos();
             (0..n).map(|i| [9.0 * at(i).1, 9.0 * at(i).0]).collect()
@@ -540,7 +540,7 @@ fn outlines_of_very_many_corners_hold_what_their_sectors_say() {
         assert!(seen[0] > 4 && seen[1] > 4, "{seen:?}");
     }
     // What is hull, shadow or sum of one is of its corners.
-    let ring = coast(&mut r, if rounds.is_some() { 8_000 } else { 5_000 });
+    let ring = coast(&mut r, if rounds.is_some() { 8_000 } else { 2_500 });
     let outline = linear("height = 2", &format!("polygon({});", list(&ring)));
     let shadow = linear("height = 1", &format!("projection() {{ {outline} }}"));
     let shadow = import_csg("m.csg", &shadow, Facets::Auto, &Limits::default()).expect("a shadow");

@@ -19,7 +19,7 @@ mod layers;
 mod pierced;
 mod proof;
 
-use crate::bound::Region;
+use crate::bound::CollisionRegion;
 use crate::contact::convex::{AtStart, ConvexParts, Sight};
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::task::Task;
@@ -107,7 +107,7 @@ type Pairs = SmallVec<[(PiercedPart, PiercedPart); 4]>;
 
 /// The pairs of parts that may come within `way` of each other in a collision region: their boxes do, those of b swept. `None` where
 /// there are many.
-fn near(task: &Task, region: &Region, of_a: &Parts, of_b: &Parts, way: f64) -> Option<Pairs> {
+fn near(task: &Task, region: &CollisionRegion, of_a: &Parts, of_b: &Parts, way: f64) -> Option<Pairs> {
     let (placed_a, placed_b) = task.relative.placed();
     let sweep = Sweep::new(placed_b, placed_a);
     let left =

@@ -2,7 +2,7 @@
 
 use super::options::QueryOptions;
 use super::question::{PairQuery, Strategies, without_own_spin};
-use crate::bound::Region;
+use crate::bound::CollisionRegion;
 use crate::bound::pair::{Side as Operand, locate};
 use crate::contact::exclusion::literal::{Faces, View};
 use crate::contact::exclusion::rounding;
@@ -137,7 +137,7 @@ impl<'a> Task<'a> {
     }
 
     /// Stage 1 over [t0, t1]: what of both bodies can take part; `None` where nothing can meet.
-    pub fn region(&self, t0: f64, t1: f64) -> Option<Arc<Region>> {
+    pub fn region(&self, t0: f64, t1: f64) -> Option<Arc<CollisionRegion>> {
         let (placed_a, placed_b) = self.relative.placed();
         let a = Operand { solid: self.a, bounds: self.model_a.bounds_for(self.level()), placed: placed_a };
         let b = Operand { solid: self.b, bounds: self.model_b.bounds_for(self.level()), placed: placed_b };

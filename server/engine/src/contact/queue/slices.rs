@@ -13,7 +13,7 @@ use super::clock::Stage;
 use super::items::Items;
 use super::roots;
 use super::roots::Root;
-use crate::bound::Region;
+use crate::bound::CollisionRegion;
 use crate::bound::pair::Pruned;
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::outcome::Counters;
@@ -52,7 +52,7 @@ pub(super) struct Slices<'s, 'a> {
 impl<'a> Slices<'_, 'a> {
     /// Halves a slice of time, or hands what `region`, which stage 1 has left of both bodies in it, holds to stage 3; all of them
     /// without one.
-    pub(super) fn decompose(&mut self, cell: &Cell, region: Option<Arc<Region>>) {
+    pub(super) fn decompose(&mut self, cell: &Cell, region: Option<Arc<CollisionRegion>>) {
         let (t0, t1) = (cell.t, cell.until);
         let (placed_a, placed_b) = self.task.relative.placed();
         let (model_a, model_b) = (self.task.model_a, self.task.model_b);
@@ -153,7 +153,7 @@ impl<'a> Slices<'_, 'a> {
     }
 
     /// What stage 1 left of a body's whole tree.
-    fn whole(&self, side: Side, region: Option<&Arc<Region>>, out: &mut Vec<Token>) -> Truth {
+    fn whole(&self, side: Side, region: Option<&Arc<CollisionRegion>>, out: &mut Vec<Token>) -> Truth {
         let solid = if side == Side::A { self.task.a } else { self.task.b };
         match region {
             Some(r) => write_pruned(solid, if side == Side::A { &r.a } else { &r.b }, out),

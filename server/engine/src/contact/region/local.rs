@@ -19,7 +19,7 @@ pub const ANGLE: f64 = 1e-7;
 
 /// Largest separation, in diameters of the smaller body, at which surfaces are said to touch in regions. From farther away
 /// all of a body is near: there one place counts, the nearest.
-const REACH: f64 = 0.125;
+pub const REACH: f64 = 0.125;
 /// Tokens for which there is room from the start in what is open at a point: few faces pass there.
 const ROOM: usize = 16;
 /// Largest deviation, in the same unit, with which they lie along each other.

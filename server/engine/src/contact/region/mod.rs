@@ -29,8 +29,6 @@ mod polytope;
 mod polytopes;
 mod single;
 mod surface;
-#[cfg(test)]
-mod tests;
 
 use crate::contact::distance::{self, DistanceQuery};
 use crate::contact::exclusion::literal::Side;
@@ -40,8 +38,10 @@ use crate::contact::instant::work::Work;
 use crate::contact::query::outcome::{ContactKind, ContactPoint, Extent, NO_FACE, Outcome, Verdict};
 use crate::contact::query::question::PairQuery;
 use crate::contact::query::task::Task;
+use crate::motion::relative::Instant;
 use glam::DVec3;
 use line::Candidate;
+pub use local::REACH;
 use local::{Bodies, Lit};
 use patch::Corner;
 use point::Meeting;
@@ -85,6 +85,22 @@ pub struct Regions {
     pub cells: u64,
 }
 
+impl Regions {
+    /// From A's frame at an instant to the world's, and to the order in which the question names the bodies.
+    fn turn_to_world(&mut self, task: &Task, at: &Instant, swapped: bool) {
+        for r in &mut self.regions {
+            r.normal = (at.world_from_a * r.normal).normalize();
+            for p in &mut r.points {
+                p.point = task.relative.world_point(at, p.point);
+            }
+            if swapped {
+                r.normal = -r.normal;
+                std::mem::swap(&mut r.faces_a, &mut r.faces_b);
+            }
+        }
+    }
+}
+
 /// Cells' worth of work that one pair's regions may cost, should its cell limit allow more.
 pub const MOST_CELLS: u64 = 20_000;
 /// A box with no more faces than this, of both sides together, is not halved for their number: 132 sets of them may balance.
@@ -117,7 +133,7 @@ fn limit(query: &PairQuery) -> u64 {
 }
 
 /// All regions in which the bodies of a question touch at `time`: surfaces within `threshold` of each other. Where
-/// none is found, since all are farther apart than `local::REACH` of the smaller body, the nearest place is the one region.
+/// none is found, since all are farther apart than [`REACH`] of the smaller body, the nearest place is the one region.
 pub fn regions(query: &PairQuery, time: f64, threshold: f64) -> Regions {
     let (task, swapped) = Task::of(query);
     if task.a.is_empty() || task.b.is_empty() {
@@ -152,20 +168,39 @@ pub fn regions(query: &PairQuery, time: f64, threshold: f64) -> Regions {
         found.regions.extend(nearest.filter(is_near).map(|m| point_region(&bodies, &m)));
         found.complete &= proven;
     }
-    for r in &mut found.regions {
-        r.normal = (at.world_from_a * r.normal).normalize();
-        for p in &mut r.points {
-            p.point = task.relative.world_point(&at, p.point);
-        }
-        if swapped {
-            r.normal = -r.normal;
-            std::mem::swap(&mut r.faces_a, &mut r.faces_b);
-        }
-    }
+    found.turn_to_world(&task, &at, swapped);
     found
 }
 
-/// Where two bodies that are farther apart than `local::REACH` are nearest, by their least distance, and the pairs of parts that were
+/// A way in which regions are found. Where more than one answers they agree, and each can be asked alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// Of convex bodies that touch in one point or along one straight line.
+    Single,
+    /// Of convex bodies that lie on each other with flat faces: by the outlines of these.
+    Flat,
+    /// Of any bodies: by boxes.
+    Boxes,
+}
+
+/// What one way alone finds at `time`, within the question's cell limit: for who compares it with another one. `None` where the way does
+/// not answer; no nearest place stands in where it finds nothing.
+pub fn in_one_way(query: &PairQuery, time: f64, threshold: f64, way: Way) -> Option<Regions> {
+    let (task, swapped) = Task::of(query);
+    let (at, work) = (task.relative.at(time), Work::new(query.cell_limit));
+    let bodies = Bodies::new(&task, &at, threshold, &work);
+    let whole = |regions| Regions { regions, complete: true, cells: 0 };
+    let mut found = match way {
+        Way::Single => whole(single::regions(&bodies)?),
+        Way::Flat => whole(flat::regions(&bodies)?),
+        Way::Boxes => in_boxes(&bodies),
+    };
+    found.cells = work.cells();
+    found.turn_to_world(&task, &at, swapped);
+    Some(found)
+}
+
+/// Where two bodies that are farther apart than [`REACH`] are nearest, by their least distance, and the pairs of parts that were
 /// looked at; `None` where the work ran out before.
 fn nearest_at(query: &PairQuery, time: f64, swapped: bool, bodies: &Bodies, limit: u64) -> (Option<Meeting>, u64) {
     let (a, b) = if swapped { (query.b, query.a) } else { (query.a, query.b) };

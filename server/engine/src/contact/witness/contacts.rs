@@ -10,7 +10,7 @@ use super::known::Known;
 use super::newton::{Actives, Constraint, Problem, SETTLED, Solution, Weights};
 use super::sides::{deciding, has_both_sides};
 use super::touch::Touch;
-use crate::bound::Region;
+use crate::bound::CollisionRegion;
 use crate::contact::exclusion::clause::Hint;
 use crate::contact::exclusion::literal::Side;
 use crate::contact::query::outcome::Counters;
@@ -71,7 +71,7 @@ pub struct Contacts<'a> {
     /// Work done so far.
     pub counters: Counters,
     /// The collision region of the whole step, once it was asked for; within: `None` where nothing can meet.
-    region: Option<Option<Arc<Region>>>,
+    region: Option<Option<Arc<CollisionRegion>>>,
 }
 
 impl<'a> Contacts<'a> {
@@ -83,7 +83,7 @@ impl<'a> Contacts<'a> {
 
     /// What of both bodies can take part over [t0, t1], by stage 1; `None` where nothing can meet. That of the whole step is located
     /// once, whoever asks.
-    pub fn region(&mut self, t0: f64, t1: f64) -> Option<Arc<Region>> {
+    pub fn region(&mut self, t0: f64, t1: f64) -> Option<Arc<CollisionRegion>> {
         if (t0, t1) == (0.0, 1.0) {
             return self.region.get_or_insert_with(|| self.task.region(t0, t1)).clone();
         }

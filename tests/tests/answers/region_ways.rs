@@ -1,19 +1,51 @@
 //! What is told without boxes of convex bodies, against what boxes tell.
 
-use super::*;
-use crate::contact::convex::ConvexPair;
-use crate::contact::query::question::{PlacedModel, Strategies, default_resolution};
-use crate::contact::{QueryOptions, Scratch, earliest_contact};
-use crate::math::random::Random;
-use crate::motion::Placed;
-use crate::octree::Model;
-use crate::octree::testing::simple;
-use crate::solid::Shape;
-use crate::solid::primitive::{Capsule, Cone, Cuboid, Cylinder, Ellipsoid, HalfSpace, Polyhedron, Sphere};
+use contactd::contact::distance::{DEFAULT_LIMIT, DistanceQuery, at_instant};
+use contactd::contact::region::{REACH, Region, RegionPoint, Regions, Way, in_one_way, regions};
+use contactd::contact::{
+    ContactKind, Extent, PairQuery, PlacedModel, QueryOptions, Scratch, Strategies, Verdict, default_resolution,
+    earliest_contact,
+};
+use contactd::math::random::Random;
+use contactd::motion::Placed;
+use contactd::octree::Model;
+use contactd::solid::Shape;
+use contactd::solid::primitive::{Capsule, Cone, Cuboid, Cylinder, Ellipsoid, HalfSpace, Polyhedron, Sphere};
+use contactd_proto::contact_record::NO_FACE;
 use contactd_proto::motion::quat_of_rotation_vector;
 use contactd_proto::{Motion, Pose};
-use glam::{DQuat, dvec3};
+use contactd_tests::models::simple;
+use contactd_tests::sweep::sized;
+use glam::{DQuat, DVec3, dvec3};
 use std::f64::consts::FRAC_PI_2;
+
+/// Diameters of the smaller body within which two points are one.
+const SAME_POINT: f64 = 1e-6;
+
+/// Two bodies at the start of a question.
+struct Bodies<'q> {
+    query: &'q PairQuery<'q>,
+    /// Surfaces nearer to each other than this touch.
+    tau: f64,
+    /// Diameter of the smaller body.
+    size: f64,
+}
+
+impl<'q> Bodies<'q> {
+    fn new(query: &'q PairQuery<'q>, tau: f64) -> Self {
+        let size = 2.0 * query.a.model.radius.min(query.b.model.radius);
+        Self { query, tau: tau.min(REACH * size), size }
+    }
+
+    /// What one way tells of them.
+    fn told(&self, way: Way) -> Option<Regions> {
+        in_one_way(self.query, 0.0, self.tau, way)
+    }
+
+    fn in_boxes(&self) -> Regions {
+        self.told(Way::Boxes).expect("boxes answer for any bodies")
+    }
+}
 
 fn shape(r: &mut Random, kind: usize) -> Shape {
     let mut length = || r.within(0.15, 0.9);
@@ -79,7 +111,7 @@ fn near(r: &mut Random, kinds: [usize; 2], largest: f64, mut judge: impl FnMut(&
     let tau = 10f64.powf(r.within(-6.0, largest));
     let gap = if r.unit() < 0.2 { 0.0 } else { tau * r.within(0.0, 1.2) };
     let query = query(&models, turns, start + along * (gap - 6.0 * contact.time), DVec3::ZERO);
-    seen(&query, tau, |bodies| judge(bodies, gap));
+    judge(&Bodies::new(&query, tau), gap);
 }
 
 /// A question about the first model at a place, moving, and the second at the origin, at rest; both turned.
@@ -96,28 +128,21 @@ fn query<'m>(models: &'m [Model; 2], turns: [DQuat; 2], start: DVec3, velocity: 
     }
 }
 
-/// Shows the bodies of a question as they stand at its start.
-fn seen(query: &PairQuery, tau: f64, mut judge: impl FnMut(&Bodies)) {
-    let (task, _) = Task::of(query);
-    let (at, work) = (task.relative.at(0.0), Work::new(100_000));
-    judge(&Bodies::new(&task, &at, tau, &work));
-}
-
 #[test]
 fn one_point_is_told_where_boxes_find_one_point() {
     let mut r = Random(0x706f_696e_7473);
     let mut seen = Seen::default();
-    let count = std::env::var("CONTACTD_POINTS").map_or(1200, |n| n.parse().expect("a number"));
+    let count = sized("CONTACTD_POINTS", 1200usize);
     for i in 0..count {
         // A half-space stands alone.
         let kinds = [(r.unit() * 8.0) as usize, (r.unit() * 9.0) as usize];
         near(&mut r, kinds, -3.0, |bodies, _| {
             let place = format!("{i}: {kinds:?}, tau {:e}", bodies.tau);
-            let Some(found) = single::regions(bodies) else {
+            let Some(Regions { regions: found, .. }) = bodies.told(Way::Single) else {
                 seen.left += 1;
                 return;
             };
-            let boxes = in_boxes(bodies);
+            let boxes = bodies.in_boxes();
             if !boxes.complete {
                 return;
             }
@@ -194,13 +219,13 @@ fn one_point_is_told_where_boxes_find_one_point() {
 fn the_patch_of_round_flat_faces_is_the_one_that_boxes_find() {
     let mut r = Random(0x0064_6973_6373);
     let (mut patches, mut beside, mut left) = (0, 0, 0);
-    let count = std::env::var("CONTACTD_POINTS").map_or(1500, |n| n.parse().expect("a number"));
+    let count = sized("CONTACTD_POINTS", 1500usize);
     for i in 0..count {
         let kinds = [[2, 3, 4][(r.unit() * 3.0) as usize], [2, 3, 4, 6, 7, 8, 9][(r.unit() * 7.0) as usize]];
         near(&mut r, kinds, -1.0, |bodies, gap| {
             let place = format!("{i}: {kinds:?}, tau {:e}", bodies.tau);
-            let found = flat::regions(bodies);
-            let boxes = in_boxes(bodies);
+            let found = bodies.told(Way::Flat);
+            let boxes = bodies.in_boxes();
             if !boxes.complete {
                 return;
             }
@@ -208,7 +233,7 @@ fn the_patch_of_round_flat_faces_is_the_one_that_boxes_find() {
                 left += usize::from(boxes.regions.iter().any(|r| r.extent == Extent::Patch));
                 return;
             };
-            let [told] = &found[..] else { panic!("{place}: {found:?}") };
+            let [told] = &found.regions[..] else { panic!("{place}: {found:?}") };
             let expected: Vec<_> = boxes.regions.iter().filter(|r| r.extent == Extent::Patch).collect();
             let [expected] = expected[..] else { panic!("{place}: {told:?} {boxes:#?}") };
             assert_eq!(
@@ -254,17 +279,15 @@ fn an_oblique_side_bounds_its_face_where_it_ends() {
     let frustum = Polyhedron::hull([bottom, top].concat()).expect("a frustum");
     let models = [simple(Cylinder { radius: 0.08, half_height: 0.5 }), simple(frustum)];
     let start = dvec3(0.415, 0.1, 0.3 + 0.06 + 0.5);
-    seen(&query(&models, [DQuat::IDENTITY; 2], start, DVec3::ZERO), 0.07, |bodies| {
-        let found = flat::regions(bodies).expect("a patch");
-        let [patch] = &found[..] else { panic!("{found:#?}") };
-        for across in [DVec3::X, DVec3::Y, DVec3::NEG_X, DVec3::NEG_Y] {
-            let rim = (start + 0.08 * across).with_z(0.33);
-            let off = |p: &RegionPoint| bodies.at.b_point(p.point).distance(rim);
-            let off = patch.points.iter().map(off).fold(f64::INFINITY, f64::min);
-            assert!(off < 1e-9, "{rim}: {off:e}, {patch:#?}");
-        }
-        assert_eq!(patch.extent, Extent::Patch);
-    });
+    let query = query(&models, [DQuat::IDENTITY; 2], start, DVec3::ZERO);
+    let found = Bodies::new(&query, 0.07).told(Way::Flat).expect("a patch");
+    let [patch] = &found.regions[..] else { panic!("{found:#?}") };
+    for across in [DVec3::X, DVec3::Y, DVec3::NEG_X, DVec3::NEG_Y] {
+        let rim = (start + 0.08 * across).with_z(0.33);
+        let off = patch.points.iter().map(|p| p.point.distance(rim)).fold(f64::INFINITY, f64::min);
+        assert!(off < 1e-9, "{rim}: {off:e}, {patch:#?}");
+    }
+    assert_eq!(patch.extent, Extent::Patch);
 }
 
 #[test]
@@ -275,15 +298,14 @@ fn a_rim_that_touches_at_two_opposite_points_is_no_line() {
     for turn in [0.0, 0.25, 0.5, 0.7, 1.0] {
         let lying = DQuat::from_rotation_z(turn * FRAC_PI_2) * DQuat::from_rotation_y(FRAC_PI_2);
         let turns = [lying, DQuat::IDENTITY];
-        seen(&query(&models, turns, DVec3::Z * 0.8, DVec3::ZERO), 1e-6, |bodies| {
-            let (boxes, alone) = (in_boxes(bodies).regions, single::regions(bodies).expect("a line"));
-            for found in [&boxes, &alone] {
-                let [line] = &found[..] else { panic!("{turn}: {found:#?}") };
-                assert_eq!((line.extent, line.points.len()), (Extent::Line, 2), "{turn}: {line:#?}");
-                let length = line.points[0].point.distance(line.points[1].point);
-                assert!((length - 2.0).abs() < 1e-9 && line.separation().abs() < 1e-9, "{turn}: {line:#?}");
-            }
-        });
+        let query = query(&models, turns, DVec3::Z * 0.8, DVec3::ZERO);
+        for way in [Way::Boxes, Way::Single] {
+            let found = in_one_way(&query, 0.0, 1e-6, way).expect("a line");
+            let [line] = &found.regions[..] else { panic!("{turn}: {found:#?}") };
+            assert_eq!((line.extent, line.points.len()), (Extent::Line, 2), "{turn}: {line:#?}");
+            let length = line.points[0].point.distance(line.points[1].point);
+            assert!((length - 2.0).abs() < 1e-9 && line.separation().abs() < 1e-9, "{turn}: {line:#?}");
+        }
     }
 }
 
@@ -293,17 +315,11 @@ fn a_ball_beside_an_edge_is_nearest_to_the_edge() {
     let models = [simple(Sphere { radius: 0.5 }), simple(Cuboid { half: DVec3::ONE })];
     for (gap, beyond) in [(6.8e-4, 3.06e-4), (6.8e-4, 1e-6), (1e-3, 0.0), (1e-5, 1e-3)] {
         let start = dvec3(1.5 + gap, 1.0 + beyond, 0.1);
-        seen(&query(&models, [DQuat::IDENTITY; 2], start, DVec3::ZERO), 1.1e-3, |bodies| {
-            let found = find(bodies).regions;
-            let [point] = &found[..] else { panic!("{gap} {beyond}: {found:#?}") };
-            let separation = (0.5 + gap).hypot(beyond) - 0.5;
-            let edge = bodies.at.a_point(dvec3(1.0, 1.0, 0.1));
-            let off = (point.points[0].point.distance(edge) - 0.5 * separation).abs();
-            assert!(
-                (point.separation() - separation).abs() < 1e-12 && off < 1e-9,
-                "{gap} {beyond}: {off:e} {point:#?}"
-            );
-        });
+        let found = regions(&query(&models, [DQuat::IDENTITY; 2], start, DVec3::ZERO), 0.0, 1.1e-3).regions;
+        let [point] = &found[..] else { panic!("{gap} {beyond}: {found:#?}") };
+        let separation = (0.5 + gap).hypot(beyond) - 0.5;
+        let off = (point.points[0].point.distance(dvec3(1.0, 1.0, 0.1)) - 0.5 * separation).abs();
+        assert!((point.separation() - separation).abs() < 1e-12 && off < 1e-9, "{gap} {beyond}: {off:e} {point:#?}");
     }
 }
 
@@ -341,10 +357,10 @@ fn what_is_far_apart_within_a_wide_threshold_is_told_by_its_least_distance() {
             [0, 1].map(|_| if r.unit() < 0.5 { DQuat::IDENTITY } else { quat_of_rotation_vector(r.vector(3.0)) });
         let start = r.vector(1.0).normalize() * r.within(2.0, 6.0);
         let query = query(&models, turns, start, DVec3::ZERO);
-        // By their supports alone, where the distance is found by parts.
-        let (task, _) = Task::of(&query);
-        let distance = ConvexPair::new(task).map_or(0.0, |pair| pair.distance());
-        let size = 2.0 * models[0].radius.min(models[1].radius);
+        let size = Bodies::new(&query, 0.0).size;
+        let (a, b) = (query.a, query.b);
+        let asked = DistanceQuery { a, b, tolerance: 1e-3 * SAME_POINT * size, limit: DEFAULT_LIMIT };
+        let distance = at_instant(&asked, 0.0).upper;
         if distance < 0.2 * size {
             continue;
         }
