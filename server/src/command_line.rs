@@ -38,8 +38,8 @@ use crate::terminal::{Paint, clean};
 use crate::view::show::Show;
 use crate::world::{PairOutcome, StepOutcome};
 use clap::Parser as _;
-use contactd_proto::ErrorCode;
 use contactd_proto::names::{Address, PROTOCOL_VERSION};
+use contactd_proto::{Detect, ErrorCode};
 use std::error::Error;
 use std::ffi::OsString;
 use std::io::{IsTerminal as _, Write as _};
@@ -407,6 +407,7 @@ fn pairs_of<'a>(scene: &Scene, files: &'a [String], check: &'a Check, outcome: &
             regions: outcome.regions_of(p),
             regions_complete: p.regions_complete,
             clearance: outcome.clearance_of(p),
+            discrete: p.plan.detect == Detect::Discrete,
         }
     };
     outcome.pairs.iter().map(pair).collect()

@@ -25,6 +25,8 @@ pub struct PairReport<'a> {
     pub regions_complete: bool,
     /// Its least distance over the step, where its rule asks for it.
     pub clearance: Option<&'a Distance>,
+    /// True where its rule looks at the end of the step alone.
+    pub discrete: bool,
 }
 
 /// The object that `check --json` prints.
@@ -50,6 +52,9 @@ pub struct PairAnswer {
     /// Told where it holds: `time` could not be continued back from its witness and equals `time_upper`.
     #[serde(skip_serializing_if = "is_false")]
     pub not_continued: bool,
+    /// Told where it holds: the rule looks at the end of the step alone, so that nothing is said of what is before.
+    #[serde(skip_serializing_if = "is_false")]
+    pub discrete: bool,
     pub point: Option<[f64; 3]>,
     pub normal: Option<[f64; 3]>,
     pub separation: Option<f64>,
@@ -216,6 +221,7 @@ impl PairAnswer {
             time_upper: reported(Report::Time).then_some(o.time_upper()),
             touching: o.touching,
             not_continued: o.not_continued() && reported(Report::Time),
+            discrete: pair.discrete,
             point: point.map(|p| p.point.to_array()),
             normal: point.map(|p| p.normal.to_array()),
             separation: point.map(|p| p.separation),
@@ -304,6 +310,7 @@ mod tests {
             regions: &[],
             regions_complete: true,
             clearance: None,
+            discrete: false,
         }
     }
 
@@ -338,6 +345,19 @@ mod tests {
         assert!(tables[1].contains("contact (not continued)"), "{}", tables[1]);
         let hit = PairReport { report: Report::Hit, ..report(&solid, &outcome) };
         assert!(!Answer::of_pairs(&[hit]).json().expect("json").contains("not_continued"), "a hit has no time");
+    }
+
+    #[test]
+    fn what_is_looked_at_where_the_step_ends_is_not_said_to_be_clear_before() {
+        let (solid, outcome) = (plate(), Outcome::clear(1e-9));
+        let swept = report(&solid, &outcome);
+        let discrete = PairReport { discrete: true, ..report(&solid, &outcome) };
+        let said = |pairs: &[PairReport<'_>]| Answer::of_pairs(pairs).table(&TableStyle::default());
+        assert!(said(&[swept]).contains("proven clear for the whole step\n"));
+        let alone = said(std::slice::from_ref(&discrete));
+        assert!(alone.contains("looked at where the step ends alone") && !alone.contains("proven"), "{alone}");
+        let both = said(&[report(&solid, &outcome), discrete]);
+        assert!(both.contains("proven clear for the whole step, discrete pairs where it ends"), "{both}");
     }
 
     #[test]

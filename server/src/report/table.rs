@@ -84,6 +84,12 @@ impl Answer {
         .map(|(_, role, text)| (Some(role), text))
         .collect();
         pieces.push(match self.safe_time {
+            1.0 if self.pairs.iter().all(|p| p.discrete) && !self.pairs.is_empty() => {
+                (None, "looked at where the step ends alone".into())
+            }
+            1.0 if self.pairs.iter().any(|p| p.discrete) => {
+                (None, "proven clear for the whole step, discrete pairs where it ends".into())
+            }
             1.0 => (None, "proven clear for the whole step".into()),
             t if t <= 0.0 => (None, "no part of the step proven clear".into()),
             t => (None, format!("proven clear until t = {}", time(t))),

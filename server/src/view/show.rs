@@ -12,7 +12,7 @@ use crate::picture::view::{Camera, Thing, View};
 use crate::report::{Answer, Feature, PairAnswer, PairReport, faces};
 use crate::terminal::{number, time};
 use crate::world::{StepOptions, StepOutcome};
-use contactd_proto::{Motion, Pose, Report, Rule};
+use contactd_proto::{Detect, Motion, Pose, Report, Rule};
 use glam::DVec3;
 use serde::Serialize;
 use std::collections::{BTreeMap, HashMap};
@@ -403,6 +403,7 @@ impl Show {
                 regions: outcome.regions_of(p),
                 regions_complete: p.regions_complete,
                 clearance: outcome.clearance_of(p),
+                discrete: p.plan.detect == Detect::Discrete,
             };
             pairs.push(PairTold::new([p.a, p.b], &report));
         }
@@ -507,6 +508,9 @@ fn summary(pairs: &[PairTold], safe: f64) -> String {
     }
     let what = if told.is_empty() { "Nothing meets".into() } else { told.join(", ") };
     match safe {
+        1.0 if pairs.iter().any(|p| p.answer.discrete) => {
+            format!("{what}; the whole step is proven clear, of discrete pairs its end.")
+        }
         1.0 => format!("{what}; the whole step is proven clear."),
         t if t <= 0.0 => format!("{what}; no part of the step is proven clear."),
         t => format!("{what}; all pairs are proven clear until t = {}.", time(t)),

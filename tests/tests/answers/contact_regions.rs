@@ -659,7 +659,8 @@ fn the_line_along_a_capsule_ends_with_its_side() {
 fn points_on_a_body_of_parts_in_each_other_are_on_its_surface() {
     let mut r = Random::new(0x0072_6f75_6e64);
     let (mut told, mut lines) = (0, 0);
-    for i in 0..sized("CONTACTD_REGIONS", 30) {
+    let few = std::env::var_os("CONTACTD_REGIONS").is_none();
+    for i in 0..sized("CONTACTD_REGIONS", 90) {
         let (half, radius) = (dvec3(r.within(0.2, 0.6), r.within(0.2, 0.6), r.within(0.2, 0.6)), r.within(0.05, 0.3));
         let mut rounded = Recipe::cuboid(half.x + radius, half.y, half.z);
         rounded = rounded.union(Recipe::cuboid(half.x, half.y + radius, half.z));
@@ -679,9 +680,12 @@ fn points_on_a_body_of_parts_in_each_other_are_on_its_surface() {
         let planes = hull.planes.clone();
         let from = r.direction() * 4.0;
         let pose_a = Pose::new(DVec3::ZERO, r.rotation());
-        let s = Rest::new(Recipe::of(hull), pose_a, rounded, Pose::new(from, r.rotation()));
-        let velocity = r.vector(0.3) - from;
-        let margin = r.within(0.02, 0.2);
+        let (turn_b, velocity, margin) = (r.rotation(), r.vector(0.3) - from, r.within(0.02, 0.2));
+        // In the command every third of them.
+        if few && i % 3 != 2 {
+            continue;
+        }
+        let s = Rest::new(Recipe::of(hull), pose_a, rounded, Pose::new(from, turn_b));
         let (o, found) = s.answer(velocity, margin);
         if o.status() != Status::Contact {
             continue;

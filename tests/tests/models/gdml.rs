@@ -225,7 +225,7 @@ fn what_is_proven_of_facets_is_proven_of_the_surface() {
     let path = folder.path().join("g.gdml");
     let mut r = Random::new(7);
     let (mut proven, mut open, mut wide) = (0, 0, 0);
-    for k in 0..sized("CONTACTD_TORI", 20usize) {
+    for k in 0..sized("CONTACTD_TORI", 24usize) {
         let scale = DVec3::new(r.within(0.5, 1.6), r.within(0.5, 1.6), r.within(0.5, 1.6));
         let bore = r.chance(0.5);
         let (u, v) = (r.within(0.0, std::f64::consts::TAU), r.within(0.0, std::f64::consts::TAU));

@@ -1,6 +1,6 @@
 //! glTF files of shows, read by code that shares nothing with what wrote them: chunks, accessors, surfaces, motions, contacts.
 //!
-//! `CONTACTD_SHOWS=200 cargo test --release -p contactd-tests --test models gltf::` sets the number of random shows (2 by default).
+//! `CONTACTD_SHOWS=200 cargo test --release -p contactd-tests --test models gltf::` sets the number of random shows (3 by default).
 
 use contactd::import::Scene;
 use contactd::octree::Model;
@@ -119,7 +119,7 @@ fn scene(objects: &[(usize, Motion)], models: usize, unit: &str) -> Scene {
 #[test]
 fn objects_of_random_shows_are_where_the_engine_has_them_at_all_times() {
     let mut r = Random::new(91);
-    for i in 0..sized("CONTACTD_SHOWS", 2usize) {
+    for i in 0..sized("CONTACTD_SHOWS", 3usize) {
         let models: Vec<Shown> = (0..1 + r.below(2))
             .map(|m| {
                 let model = Arc::new(Model::new(solid_of(&mut r, 1, shape_or_torus)));

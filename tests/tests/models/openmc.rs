@@ -855,26 +855,37 @@ fn what_is_wrong_is_told_in_one_sentence_with_its_place() {
             "<dagmc_universe id='1' filename='a.h5m'/>",
             "2:1: expected a supported construct, found <dagmc_universe>, which is not supported",
         ),
-        ("<cell id='1' region='-7'/>", "2:49: expected the id of a surface in the region, found 7"),
-        ("<cell id='1' region='-1 | '/>", "2:49: expected a surface, ~ or ( in the region, found the region's end"),
-        ("<cell id='1' region='(-1'/>", "2:49: expected ) in the region, found the region's end"),
-        ("<cell id='1' region='-1)'/>", "2:49: expected a surface, |, ~ or ( in the region, found \")\""),
+        ("<cell id='1' region='-7' material='1'/>", "2:49: expected the id of a surface in the region, found 7"),
+        (
+            "<cell id='1' region='-1 | ' material='1'/>",
+            "2:49: expected a surface, ~ or ( in the region, found the region's end",
+        ),
+        ("<cell id='1' region='(-1' material='1'/>", "2:49: expected ) in the region, found the region's end"),
+        ("<cell id='1' region='-1)' material='1'/>", "2:49: expected a surface, |, ~ or ( in the region, found \")\""),
         ("<cell id='1' region='-1' fill='9'/>", "2:49: expected the id of a universe or lattice as the fill, found 9"),
         (
-            "<cell id='1' region='-1' rotation='0 0 1'/>",
+            "<cell id='1' material='1' region='-1' rotation='0 0 1'/>",
             "2:49: expected a fill of a cell with a translation or rotation, found none",
         ),
-        ("<cell id='1'/><cell id='1'/>", "2:63: expected an id that no other cell has, found \"1\""),
+        (
+            "<cell id='1' material='1'/><cell id='1' material='1'/>",
+            "2:76: expected an id that no other cell has, found \"1\"",
+        ),
         (
             "<cell id='1' fill='2'/><cell id='2' universe='2' fill='3'/><cell id='3' universe='3' fill='2'/>",
             "2:72: expected universes that are not in themselves, found universe 2 in itself",
         ),
+        ("<cell id='1' region='-1'/>", "2:49: expected either a material or a fill of cell 1, found \"neither\""),
         (
-            "<cell id='1' region='-1'/><cell id='2' universe='5'/>",
-            "notes: 2:75: universe 5 is left out: it fills nothing, and universe 0 is the root",
+            "<cell id='1' region='-1' material='1' fill='2'/>",
+            "2:49: expected either a material or a fill of cell 1, found \"both\"",
         ),
         (
-            "<cell id='1' region='1'/>",
+            "<cell id='1' region='-1' material='1'/><cell id='2' universe='5' material='1'/>",
+            "notes: 2:88: universe 5 is left out: it fills nothing, and universe 0 is the root",
+        ),
+        (
+            "<cell id='1' region='1' material='1'/>",
             "notes: 2:49: universe 0 has no end: it is asked of within x from -3 to 3, y from -3 to 3, z from -3 to 3 (centimetres)",
         ),
     ];

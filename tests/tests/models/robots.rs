@@ -384,6 +384,19 @@ fn a_link_that_swings_meets_what_is_in_its_way_on_its_arc() {
     }
 }
 
+/// A geometry has one shape: what else is in it is told, and does not count.
+#[test]
+fn a_second_shape_of_a_geometry_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("two.urdf");
+    let shapes = "<sphere radius=\"1\"/>\n<box size=\"4 4 4\"/>";
+    let text = format!("<robot><link name=\"a\"><collision><geometry>{shapes}</geometry></collision></link></robot>");
+    std::fs::write(&path, text).expect("written");
+    let robot = read_robot(&path, &Ask::default()).unwrap_or_else(|e| panic!("{e}"));
+    let [note] = &robot.notes[..] else { panic!("{:?}", robot.notes) };
+    assert!(note.at.line == 2 && note.text == "a collision of a has a shape already: its box is left out", "{note:?}");
+}
+
 #[test]
 fn what_is_wrong_is_one_sentence_with_its_place() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -470,6 +483,24 @@ fn what_is_wrong_is_one_sentence_with_its_place() {
             "<mujoco><worldbody><geom type=\"box\" size=\"1 1\"/></worldbody></mujoco>",
             &none,
             "expected 3 sizes of the geom",
+        ),
+        (
+            "a.xml",
+            "<mujoco><worldbody><geom type=\"box\" size=\"1 1 1 1\"/></worldbody></mujoco>",
+            &none,
+            "expected three sizes of the geom at most, found \"1 1 1 1\"",
+        ),
+        (
+            "a.xml",
+            "<mujoco><asset><mesh name=\"m\" file=\"a.stl\"/><mesh name=\"m\" file=\"b.stl\"/></asset></mujoco>",
+            &none,
+            "a.xml:1:45: expected a name that no other mesh has, found \"m\"",
+        ),
+        (
+            "a.urdf",
+            &two.replace("<limit", "<axis xyz=\"0 0 0\"/><limit"),
+            &none,
+            "expected an axis of j that is not 0, found \"[0, 0, 0]\"",
         ),
         (
             "a.sdf",

@@ -1,6 +1,6 @@
 //! Points and rays among the bodies of random worlds, and of a session whose bodies have moved.
 //!
-//! The judge has an f of its own for each body. `CONTACTD_PROBE_WORLDS=500` sets the number of worlds (5 by default).
+//! The judge has an f of its own for each body. `CONTACTD_PROBE_WORLDS=500` sets the number of worlds (6 by default).
 
 use super::judge::{Judge, refuted, solid};
 use super::rays::drawn;
@@ -69,7 +69,7 @@ fn refuted_by_any(body: Option<u32>, answer: &RayAnswer, ray: &Ray, judges: &[Ju
 #[test]
 fn first_hits_among_bodies_are_refuted_by_none_of_them() {
     let (mut failures, mut hits, mut all) = (Vec::new(), 0, 0);
-    for i in 0..sized("CONTACTD_PROBE_WORLDS", 5usize) {
+    for i in 0..sized("CONTACTD_PROBE_WORLDS", 6usize) {
         let mut r = Random::new(97_000 + i as u64);
         let Bodies { world, judges, .. } = Bodies::drawn(&mut r, i);
         let asked: Vec<Ray> = (0..EACH).map(|_| drawn(&mut r, DVec3::ZERO, 2.5)).collect();
@@ -100,7 +100,7 @@ fn first_hits_among_bodies_are_refuted_by_none_of_them() {
 fn signed_distances_among_bodies_are_the_least_of_all() {
     let options = PointOptions { surface: 1e-7, tolerance: 1e-6, limit: DEFAULT_LIMIT };
     let mut inside = 0;
-    for i in 0..sized("CONTACTD_PROBE_WORLDS", 5usize) {
+    for i in 0..sized("CONTACTD_PROBE_WORLDS", 6usize) {
         let mut r = Random::new(98_000 + i as u64);
         let Bodies { world, judges, models } = Bodies::drawn(&mut r, i);
         let asked: Vec<DVec3> = (0..EACH).map(|_| r.vector(2.5)).collect();

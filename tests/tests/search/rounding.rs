@@ -328,7 +328,7 @@ const OF_A_KIND: u64 = 4_000;
 fn nothing_that_is_computed_differs_from_the_exact_value_by_more_than_the_budget() {
     let mut r = Random::new(7);
     let models = models(&mut r);
-    evaluate(&mut r, &models, evaluations(10_000), "all kinds");
+    evaluate(&mut r, &models, evaluations(20_000), "all kinds");
 }
 
 #[test]

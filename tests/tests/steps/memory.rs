@@ -197,12 +197,13 @@ fn an_edge_of_a_side_that_leans_is_told_beside_its_patch() {
 /// Plays in which a session was told otherwise than a new one, or a certificate did not hold: answers repeated under another limit,
 /// directions that were remembered and prove less than a first look, discrete pairs, pairs later than the first contact, unbounded
 /// bodies, multipliers that all but vanish on their way, overlaps whose depth was worked out within a limit, bodies that met before
-/// and whose search a limit cuts short where a look would have shown them apart.
+/// and whose search a limit cuts short where a look would have shown them apart. Of 40,000,148 a predicted motion would be wrong that is
+/// proven at a depth instead of a distance.
 #[test]
 fn plays_that_were_told_wrong_once_are_told_right() {
     let seeds = [
         40_000_197, 40_000_158, 40_000_175, 40_000_779, 40_001_917, 40_001_935, 40_002_002, 40_002_375, 40_003_306,
-        40_002_817, 40_000_682, 77_001_574, 260_416, 99_970_358,
+        40_002_817, 40_000_682, 40_000_148, 77_001_574, 260_416, 99_970_358,
     ];
     seeds.into_par_iter().for_each(|seed| {
         let work = run(seed, STEPS);

@@ -6,7 +6,7 @@
 //! stays where it is: nothing of it is ever deeper than what twice the resolution allows. No answer is left
 //! undecided.
 //!
-//! 4,000 stops here; `CONTACTD_STOPS=1000000 cargo test -p contactd-tests --test steps stopping::` makes a million.
+//! 10,000 stops here; `CONTACTD_STOPS=1000000 cargo test -p contactd-tests --test steps stopping::` makes a million.
 
 use contactd::contact::{
     Outcome, PairQuery, PlacedModel, QueryOptions, Scratch, Status, Strategies, default_resolution, earliest_contact,
@@ -24,7 +24,7 @@ use contactd_tests::sweep::sized;
 use glam::{DQuat, DVec3, dvec3};
 
 /// Stops of the plain test command, and how often a body is pressed on before it is dropped anew.
-const STOPS: usize = 4_000;
+const STOPS: usize = 10_000;
 const PRESSES: usize = 8;
 /// Cells that one answer may cost before it is left undecided, and those that the dearest of the plain test command may: an
 /// advance by less than rounding is no progress, and cells that are put back after it come again by hundreds.

@@ -183,6 +183,11 @@ fn cell(node: Node<'_, '_>, own: i64, surfaces: &HashMap<i64, usize>) -> Result<
     };
     let universe = value(node, "universe").map_or(Ok(0), |_| id(node, "universe"))?;
     let fill = value(node, "fill").map(|_| id(node, "fill")).transpose()?;
+    // OpenMC's own rule. `<material/>` without a value would be none either.
+    if fill.is_some() == value(node, "material").is_some_and(|text| !text.trim().is_empty()) {
+        let found = if fill.is_some() { "both" } else { "neither" };
+        return Err(xml::wrong(node, format!("either a material or a fill of {name}"), Some(found)));
+    }
     let region = value(node, "region").unwrap_or_default();
     let region = region::read(&region, surfaces).map_err(|problem| (xml::place(node), problem))?;
     let three = |key: &str| match value(node, key) {

@@ -17,6 +17,7 @@ use contactd_proto::Pose;
 use contactd_proto::motion::quat_of_rotation_vector;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use roxmltree::{Document, Node};
+use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
@@ -143,7 +144,12 @@ impl<'a, 'i> Model<'a, 'i> {
         let name = attributes.get("name").cloned().or_else(|| attributes.get("file").and_then(stem));
         let Some(name) = name else { return Err(xml::wrong(asset, format!("a name or a file of the {kind}"), None)) };
         let all = if kind == "mesh" { &mut self.meshes } else { &mut self.fields };
-        all.insert(name, (attributes, asset));
+        match all.entry(name) {
+            Entry::Vacant(free) => _ = free.insert((attributes, asset)),
+            Entry::Occupied(taken) => {
+                return Err(xml::wrong(asset, format!("a name that no other {kind} has"), Some(taken.key())));
+            }
+        }
         Ok(())
     }
 
@@ -403,6 +409,9 @@ impl<'a, 'i> Model<'a, 'i> {
             return Ok(());
         }
         let sizes = of("size").map_or(Ok(vec![]), |text| numbers_of(node, text, "size"))?;
+        if sizes.len() > 3 {
+            return Err(xml::wrong(node, "three sizes of the geom at most", of("size")));
+        }
         let size = |k: usize| {
             sizes.get(k).copied().ok_or_else(|| xml::wrong(node, format!("{} sizes of the geom", k + 1), of("size")))
         };

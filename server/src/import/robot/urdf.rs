@@ -117,6 +117,11 @@ fn link(
             return Err(xml::wrong(collision, "a geometry of the collision", None));
         };
         let shape = geometry_of(geometry, reader)?;
+        for other in geometry.children().filter(|n| n.is_element()).skip(1) {
+            // As other readers take it.
+            let kind = other.tag_name().name();
+            robot.note(xml::place(other), format!("a collision of {name} has a shape already: its {kind} is left out"));
+        }
         if shape.is_nothing() {
             robot.note(xml::place(geometry), format!("a collision of {name} has no inside and is left out"));
             continue;
@@ -151,8 +156,10 @@ fn dofs_of(node: Node<'_, '_>, robot: &mut Robot) -> Result<Vec<Dof>> {
         robot.note(xml::place(node), format!("the joint {name} has no limit: it is taken without limits"));
     }
     let anchor = DVec3::ZERO;
-    let along =
-        || axis.try_normalize().ok_or_else(|| xml::wrong(node, "an axis that is not 0", Some(&axis.to_string())));
+    let along = || {
+        axis.try_normalize()
+            .ok_or_else(|| xml::wrong(node, format!("an axis of {name} that is not 0"), Some(&axis.to_string())))
+    };
     let (kind, mut range) = match needed(node, "type")? {
         "fixed" => return Ok(vec![]),
         "revolute" => (DofKind::Hinge { anchor, axis: along()? }, limits()?),
