@@ -378,6 +378,10 @@ fn check_scene(arguments: &CheckArguments, paint: Paint) -> Result<Done, Box<dyn
     let answer = Answer { safe_time: outcome.safe_time, ..Answer::of_pairs(&pairs) };
     let style = TableStyle { all: arguments.all, wide: arguments.wide, paint };
     let mut text = if arguments.json { answer.json()? + "\n" } else { answer.table(&style) };
+    let is_static = check.world.bodies().iter().filter(|body| body.is_static).count();
+    if !arguments.json && outcome.pairs.is_empty() && is_static > 1 {
+        text += "static objects are not asked about with each other: see `contactd overlaps`\n";
+    }
     if arguments.explain {
         // Beside JSON it goes to standard error, which may be a file.
         let style = if arguments.json { TableStyle { paint: Paint::default(), ..style } } else { style };

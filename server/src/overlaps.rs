@@ -286,7 +286,11 @@ fn ask(pair: [&Standing<'_>; 2], tolerance: Option<f64>, scratch: &mut Scratch) 
     };
     let outcome = earliest_contact(&query, scratch);
     let off = pair[0].off.max(pair[1].off);
+    // Beside what is far larger a body may be thinner than what rounding leaves untold: then nothing can be deep in both.
+    let is_vanishing =
+        tolerance.is_none() && a.model.solid.thinnest().min(b.model.solid.thinnest()) <= 4.0 * resolution;
     match verdict(pair, &outcome, 2.0 * resolution) {
+        Verdict::Separate(bound) if is_vanishing => Verdict::NotProven(Some(bound + off)),
         found if off == 0.0 => found,
         // What is meant lies within {f <= off} of what is searched, f being at most the distance: where these are apart, so is that.
         Verdict::Separate(bound) => match margin::touching(&query, 2.0 * off, scratch).0 {

@@ -342,6 +342,40 @@ fn a_changed_bit_is_found_and_its_step_named() {
     changed[place] ^= 1;
     let said = told(&changed).map(|_| ()).unwrap_err().to_string();
     assert!(said.contains("found damage after"), "{said}");
+    // A chunk that is taken for a record of another kind is passed over, or stands there twice: the number of steps tells.
+    let chunk = chunk_at(&bytes, steps[39].0);
+    let mut lost = bytes.clone();
+    lost[chunk.start] ^= 0x80;
+    let twice = [&bytes[..chunk.end], &bytes[chunk.start..]].concat();
+    let said = told(&lost).map(|_| ()).unwrap_err().to_string();
+    assert!(said.contains("expected 40 steps, as it says at its end, found "), "{said}");
+    // What comes a second time may have another answer.
+    if let Ok(replayed) = told(&twice) {
+        assert!(replayed.difference.is_some(), "{}", replayed.text());
+    }
+    // Whatever byte of a record's head is changed: one sentence.
+    for place in (chunk.start..chunk.start + 60).chain(8..60) {
+        let mut changed = bytes.clone();
+        changed[place] ^= 0x41;
+        if let Err(e) = told(&changed) {
+            let said = e.to_string();
+            assert!(!said.contains('\n') && !said.contains('\u{1b}'), "{place}: {said}");
+        }
+    }
+}
+
+/// Where the record around a place lies in a recording: the opcode, eight bytes of length, the rest.
+fn chunk_at(bytes: &[u8], place: usize) -> std::ops::Range<usize> {
+    let mut at = 8;
+    loop {
+        let long = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) as usize;
+        let end = at + 9 + long;
+        if place <= end {
+            assert_eq!(bytes[at], 6, "messages stand in chunks");
+            return at..end;
+        }
+        at = end;
+    }
 }
 
 /// A disk that takes nothing until it is let.
@@ -482,6 +516,9 @@ fn a_disk_without_room_is_asked_again_and_then_ends_the_recording_and_no_step() 
             let said = &status.failure;
             assert!(said.starts_with("a full disk: ") && said.ends_with("there is no room"), "{said}");
             assert!(replayed.is_cut, "{}", replayed.text());
+            // What was taken and does not stand in the file is left out, as what came afterwards.
+            assert_eq!(status.steps + status.dropped, k as u64);
+            assert!(status.steps <= replayed.steps, "{} of {}", replayed.steps, status.steps);
         }
     }
 }

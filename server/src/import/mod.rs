@@ -15,6 +15,7 @@ pub mod font;
 pub mod format;
 pub mod gdml;
 pub mod mesh;
+mod names;
 pub mod openmc;
 pub mod openscad;
 pub mod problem;

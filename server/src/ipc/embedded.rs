@@ -130,8 +130,9 @@ impl Embedded {
         self.recordings += 1;
         self.scene.record(self.recordings, || None);
         recording.recorder.stop();
-        let status = recording.ended.recv();
-        status.map_err(|_| recordings::refusal("the recorder has failed"))
+        let ended = recording.ended.recv();
+        // After a failure steps have gone on being left out.
+        ended.map(|_| recording.recorder.status()).map_err(|_| recordings::refusal("the recorder has failed"))
     }
 
     fn import(&mut self, import: Import) -> Answer {

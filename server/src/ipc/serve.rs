@@ -136,6 +136,9 @@ pub fn serve(address: &Address, config: ServerConfig, ready: impl FnOnce(&Server
     let hangup = Arc::new(AtomicBool::new(false));
     signal_hook::flag::register(signal_hook::consts::SIGHUP, hangup.clone())
         .map_err(|e| ServeError::System(Error::System(format!("signal handler: {e}"))))?;
+    // A file that may not become larger (`ulimit -f`) would end the process by SIGXFSZ; heard and left at that, the write fails instead.
+    signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default())
+        .map_err(|e| ServeError::System(Error::System(format!("signal handler: {e}"))))?;
     let mut server = Server::start(address, config)?;
     server.hears(hangup);
     ready(&server);

@@ -24,10 +24,14 @@ pub use message::{About, Change, FORMAT, Opening, StepMessage, topic};
 pub use queue::{LIMIT, Recorder, Tap};
 pub use scene::{SceneFolder, Standing};
 
-/// An error of the library's, with its cause: of a disk that is full its own sentence says "I/O error" alone.
+/// An error of the library's in one sentence: of a disk that is full its cause says what it is, and the causes of records that do not
+/// fit their kind are pictures of several lines.
 fn with_cause(error: &mcap::McapError) -> String {
-    match std::error::Error::source(error) {
-        Some(cause) => format!("{error}: {cause}"),
-        None => error.to_string(),
+    if let mcap::McapError::Io(cause) = error {
+        return cause.to_string();
+    }
+    match std::error::Error::source(error).map(ToString::to_string) {
+        Some(cause) if !cause.trim().contains('\n') => format!("{error}: {}", cause.trim()),
+        _ => error.to_string().lines().next().unwrap_or_default().to_owned(),
     }
 }

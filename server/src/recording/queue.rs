@@ -72,6 +72,12 @@ impl Load {
         self.items.fetch_sub(1, Relaxed);
     }
 
+    /// Steps that were taken do not come to stand in the file: they are left out as well.
+    pub fn lost(&self, steps: u64) {
+        self.steps.fetch_sub(steps, Relaxed);
+        self.dropped.fetch_add(steps, Relaxed);
+    }
+
     /// True when more than one part of so many is on its way.
     pub fn is_beyond(&self, part: usize) -> bool {
         self.bytes.load(Relaxed) > LIMIT / part || self.items.load(Relaxed) > LENGTH / part

@@ -67,7 +67,9 @@ impl Recorder {
         let write = move || {
             yield_to_others();
             let sink = Counted { sink, load: load.clone() };
-            if let Err(e) = write(sink, &from, &load, words) {
+            let mut pending = 0;
+            if let Err(e) = write(sink, &from, &load, words, &mut pending) {
+                load.lost(pending + from.try_iter().filter(|item| matches!(item, Item::Step(_))).count() as u64);
                 *load.failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner) =
                     format!("{path}: {}", super::with_cause(&e));
             }
@@ -113,8 +115,14 @@ impl Write for Counted {
     }
 }
 
-/// Writes what comes out of a queue, to its end.
-fn write(sink: Counted, from: &Receiver<Item>, load: &Load, about: BTreeMap<String, String>) -> McapResult<()> {
+/// Writes what comes out of a queue, to its end; `pending`: the steps that were taken and can not be read yet.
+fn write(
+    sink: Counted,
+    from: &Receiver<Item>,
+    load: &Load,
+    about: BTreeMap<String, String>,
+    pending: &mut u64,
+) -> McapResult<()> {
     let options = WriteOptions::new()
         .compression(None)
         .profile("")
@@ -130,6 +138,7 @@ fn write(sink: Counted, from: &Receiver<Item>, load: &Load, about: BTreeMap<Stri
         match from.try_recv() {
             Ok(item) => {
                 let (size, busy) = (item.size(), load.is_beyond(BUSY));
+                *pending += u64::from(matches!(item, Item::Step(_)));
                 let written = file.item(item, busy.then_some(load));
                 load.taken(size);
                 written?;
@@ -146,6 +155,7 @@ fn write(sink: Counted, from: &Receiver<Item>, load: &Load, about: BTreeMap<Stri
         if is_fresh && flushed.elapsed() >= FLUSH {
             file.writer.flush()?;
             (flushed, is_fresh) = (Instant::now(), false);
+            *pending = 0;
         }
     }
     file.end(load)

@@ -135,9 +135,17 @@ pub fn replay(path: &Path, mut told: impl FnMut(u64)) -> Result<Replayed, Replay
     }
     out.sessions = sessions.len() as u64;
     out.is_cut = recording.is_cut;
-    let said = recording.end.as_ref().and_then(|end| end.get("dropped")).and_then(|n| n.parse().ok());
-    out.dropped = said.unwrap_or(out.dropped);
-    Ok(out)
+    let said = |what: &str| recording.end.as_ref().and_then(|end| end.get(what)).and_then(|n| n.parse::<u64>().ok());
+    out.dropped = said("dropped").unwrap_or(out.dropped);
+    // What a reader of MCAP takes for a record that it does not know is passed over: so steps can be lost.
+    let counted = said("steps").filter(|steps| *steps != out.steps && out.difference.is_none());
+    match counted {
+        Some(steps) => Err(ReplayError::Content(
+            name,
+            format!("expected {steps} steps, as it says at its end, found {}: the file is damaged", out.steps),
+        )),
+        None => Ok(out),
+    }
 }
 
 /// The settings of the engine that was recorded.

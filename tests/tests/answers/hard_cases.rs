@@ -747,3 +747,37 @@ fn a_ball_that_starts_in_a_face_is_told_in_front_of_the_search() {
     }
     assert!(told.iter().all(|n| *n > 0), "{told:?}");
 }
+
+/// Balls, blocks and a bored block that fly through each other from ever farther away: told exactly, or at a coarser resolution, and not
+/// decided at all where rounding takes more than there is of them. None is told clear.
+#[test]
+fn what_flies_by_faster_than_rounding_tells_is_not_told_clear() {
+    let shapes = [
+        Recipe::sphere(1.0),
+        Recipe::cuboid(1.0, 0.8, 0.6),
+        Recipe::cuboid(1.0, 0.8, 0.6).minus(Recipe::cylinder(0.2, 2.0)),
+    ];
+    let (mut met, mut open) = (0, 0);
+    for (i, shape) in shapes.iter().enumerate() {
+        for power in 3..=15 {
+            let far = 10f64.powi(power);
+            for spin in [DVec3::ZERO, DVec3::Z * 0.3] {
+                let flies = going(DVec3::X * far, DQuat::IDENTITY, DVec3::X * (-2.0 * far), spin);
+                let scene = scene(shape.clone(), still(), shapes[0].clone(), flies);
+                let o = ask(&scene);
+                match o.status() {
+                    Status::Contact => {
+                        assert!((o.time() - 0.5).abs() <= 2.0 / far, "{i} {far:e}: {o:?}");
+                        met += 1;
+                    }
+                    Status::Undecided => {
+                        assert!(power > 8, "{i} {far:e}: {o:?}");
+                        open += 1;
+                    }
+                    Status::Clear | Status::Overlap => panic!("{i} {far:e}: {o:?}"),
+                }
+            }
+        }
+    }
+    assert!(met >= 36 && open >= 6, "{met} met, {open} open");
+}

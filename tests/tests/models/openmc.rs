@@ -885,6 +885,10 @@ fn what_is_wrong_is_told_in_one_sentence_with_its_place() {
             "notes: 2:88: universe 5 is left out: it fills nothing, and universe 0 is the root",
         ),
         (
+            "<cell id='1' region='-1' material='1' densty='2'/>",
+            "notes: 2:49: <cell> has no attribute \"densty\": it is left out",
+        ),
+        (
             "<cell id='1' region='1' material='1'/>",
             "notes: 2:49: universe 0 has no end: it is asked of within x from -3 to 3, y from -3 to 3, z from -3 to 3 (centimetres)",
         ),

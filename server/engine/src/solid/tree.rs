@@ -239,6 +239,11 @@ impl Solid {
         Self { measured, ..self }
     }
 
+    /// The smallest dimension of its primitives; infinite without any, and of such as have none.
+    pub fn thinnest(&self) -> f64 {
+        self.primitives.iter().map(|p| p.shape.geometry().smallest_dimension()).fold(f64::INFINITY, f64::min)
+    }
+
     /// The box of the solid by the plain upward rule (no pruning); the bound floor does better.
     pub fn aabb(&self) -> Aabb {
         let mut boxes: Vec<Aabb> = Vec::with_capacity(self.nodes.len());

@@ -30,8 +30,7 @@ pub struct MeasuredModel {
 impl MeasuredModel {
     /// Measures a model.
     pub fn new(model: Arc<Model>) -> Self {
-        let primitives = model.solid.primitives.iter();
-        let smallest = primitives.map(|p| p.shape.geometry().smallest_dimension()).fold(f64::INFINITY, f64::min);
+        let smallest = model.solid.thinnest();
         let aabb = model.solid.aabb();
         // An unbounded or empty solid has no size of its own: its partner's decides.
         let resolution =

@@ -101,6 +101,8 @@ fn read_with(bytes: &[u8], marks: Option<Marks>) -> Result<(Volumes, Option<Mark
         return Err(xml::wrong(root, "gdml as the root element", Some(root.tag_name().name())));
     }
     only(root, &["define", "materials", "solids", "structure", "setup", "userinfo"])?;
+    // The names of the format; those that `Names` has are of the file.
+    let unknown = super::names::Names::of(include_str!("gdml.names")).unknown(root);
     let mut geometry = Geometry {
         names: Names::new(),
         positions: HashMap::new(),
@@ -128,6 +130,9 @@ fn read_with(bytes: &[u8], marks: Option<Marks>) -> Result<(Volumes, Option<Mark
         }
     }
     let mut out = Volumes::default();
+    for (node, text) in unknown {
+        out.note(xml::place(node), text);
+    }
     let mut index: HashMap<&str, usize> = HashMap::new();
     for structure in xml::inside(root, "structure") {
         for node in structure.children().filter(Node::is_element) {

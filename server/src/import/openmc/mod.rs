@@ -173,7 +173,11 @@ fn read(bytes: &[u8]) -> Result<Universes> {
     if geometry.cells.is_empty() {
         return Err(xml::wrong(node, "cells in the geometry", None));
     }
-    geometry.seen()
+    let mut seen = geometry.seen()?;
+    for (node, text) in super::names::Names::of(include_str!("openmc.names")).unknown(node) {
+        seen.notes.push(Note { at: xml::place(node), text, amount: None });
+    }
+    Ok(seen)
 }
 
 fn cell(node: Node<'_, '_>, own: i64, surfaces: &HashMap<i64, usize>) -> Result<RawCell> {

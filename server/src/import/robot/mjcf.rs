@@ -4,12 +4,12 @@
 //! that are welded to each other, nor of a body and its parent unless that is the world. Meshes are their convex hulls. Geoms of which
 //! both masks are 0 are seen and do not collide: they are not read.
 
+use super::super::names::Names;
 use super::super::problem::Problem;
 use super::super::{Place, xml};
 use super::kinematics::{Dof, DofKind, Link, Part, Robot};
 use super::mjcf_couplings::{Slot, begin_at, equalities, filters, paired};
 use super::mjcf_files::{FLAG, Files, flag, included};
-use super::names::Names;
 use super::reader::Reader;
 use super::shape::{Shape, union};
 use super::urdf::{Result, needed, not_negative, numbers_of, vector_of};

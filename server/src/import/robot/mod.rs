@@ -12,7 +12,6 @@ mod kinematics;
 mod mjcf;
 mod mjcf_couplings;
 mod mjcf_files;
-mod names;
 mod reader;
 mod scene;
 mod sdf;

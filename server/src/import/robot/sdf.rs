@@ -4,11 +4,11 @@
 //! Links of a model are tested against each other where `self_collide` says so; static models against all others. What is in a model
 //! is called `MODEL::NAME`, joints too; those of a file that has one model are called by their own names.
 
+use super::super::names::Names;
 use super::super::problem::Problem;
 use super::super::{Place, xml};
 use super::frames::{Attached, Frames, Lost};
 use super::kinematics::{Dof, DofKind, Link, Robot};
-use super::names::Names;
 use super::reader::Reader;
 use super::sdf_elements::{content, geometry_of, is_set, is_true, placed, text, version_of};
 use super::shape::Collisions;

@@ -3,10 +3,10 @@
 //! Source: wiki.ros.org/urdf/XML. Fixed axes roll, pitch, yaw: R = Rz(yaw) Ry(pitch) Rx(roll). Links that a joint connects are
 //! not tested against each other.
 
+use super::super::names::Names;
 use super::super::problem::Problem;
 use super::super::{Place, xml};
 use super::kinematics::{Dof, DofKind, Link, Robot};
-use super::names::Names;
 use super::reader::Reader;
 use super::shape::{Collisions, Shape};
 use contactd_proto::Pose;

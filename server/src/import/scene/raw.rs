@@ -47,7 +47,7 @@ pub(super) struct RawObject {
     pub(super) model: Spanned<String>,
     /// Its group, which rules name; else "default".
     pub(super) group: Option<String>,
-    /// "static": declared never to move; or "moving", as without it.
+    /// "static": declared never to move, and never asked about with another static one; or "moving", as without it.
     pub(super) motion: Option<Spanned<String>>,
     /// The model in the object's frame.
     #[serde(default)]

@@ -108,6 +108,9 @@ const COARSENINGS: usize = 3;
 /// The largest that a resolution becomes by that, relative to the smallest primitive.
 const LARGEST_COARSE: f64 = 1e-3;
 
+/// Resolutions that the thinnest primitive is thick at least, where rounding raises them: deeper than that it has no inside left.
+const LEAST_THICKNESS: f64 = 4.0;
+
 /// What a search that took too long has proven: no point is `depth` deep in both bodies before `free_until`, or before the contact found's
 /// own goal.
 #[derive(Debug)]
@@ -213,7 +216,13 @@ impl<'a> PairSearch<'a> {
             ..Counters::default()
         };
         let outcome = Outcome { resolution: task.delta, depth: task.delta, counters, ..Outcome::default() };
+        // Far out, or on the way there, rounding may take more than there is of a body: then no depth tells anything of it.
+        let is_raised = task.delta > query.resolution;
         let state = match quick {
+            _ if is_raised && task.thinnest() <= LEAST_THICKNESS * task.delta => {
+                let verdict = Verdict::Undecided { time_lower: 0.0 };
+                State::Reported(Outcome { verdict, resolution: task.delta, ..*before }, scratch)
+            }
             Quick::Overlap(x) => State::Overlap(x, *before, scratch),
             Quick::Open(along) => State::Posed(along, scratch),
             Quick::Reported => State::Reported(*before, scratch),
@@ -592,15 +601,13 @@ impl<'a> PairSearch<'a> {
     fn coarsen(&mut self, t: f64, found: Option<Found>) -> bool {
         let models = [self.task.model_a, self.task.model_b];
         let resolution = clear_of_walls(COARSER * self.resolution, self.task.rounding, models);
-        let primitives = self.task.a.primitives.iter().chain(&self.task.b.primitives);
-        let smallest = primitives.map(|p| p.shape.geometry().smallest_dimension()).fold(f64::INFINITY, f64::min);
         // What is proven at the finest resolution is worth most, but for a contact that was found.
         if self.open.as_ref().is_none_or(|open| open.found.is_none() && found.is_some()) {
             let (resolution, depth) = (self.resolution, self.task.delta);
             self.open = Some(Box::new(Open { resolution, depth, free_until: t, found }));
         }
         let allowed = self.task.strategies.coarser && self.coarser < COARSENINGS;
-        if !allowed || resolution > LARGEST_COARSE * smallest {
+        if !allowed || resolution > LARGEST_COARSE * self.task.thinnest() {
             return false;
         }
         self.coarser += 1;
@@ -616,8 +623,12 @@ impl<'a> PairSearch<'a> {
     /// Raises the resolution, unless that was done often enough.
     fn raise(&mut self) -> bool {
         let Some(more) = RAISES.get(self.raised) else { return false };
+        let resolution = raised(self.resolution, *more, self.task.rounding);
+        if self.task.thinnest() <= LEAST_THICKNESS * resolution {
+            return false;
+        }
         self.raised += 1;
-        self.resolution = raised(self.resolution, *more, self.task.rounding);
+        self.resolution = resolution;
         self.outcome.resolution = self.resolution;
         // What was twice as deep as the resolution may be less than that now: then the promise is one for once.
         if self.task.ignored_depth == 0.0 {

@@ -89,6 +89,11 @@ impl<'a> Task<'a> {
         (task, swapped)
     }
 
+    /// The smallest dimension of both bodies' primitives.
+    pub(in crate::contact) fn thinnest(&self) -> f64 {
+        self.a.thinnest().min(self.b.thinnest())
+    }
+
     /// A cell, by its centre and half extents, at an instant of its own time.
     pub(in crate::contact) fn view<'v>(
         &self,

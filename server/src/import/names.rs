@@ -3,7 +3,7 @@
 //! Each line of a `.names` file has an element, its attributes, and behind a bar the elements that may be in it (`*`: any); without a bar
 //! all that have lines. Elements without lines are not looked into: sensors, plugins, what a viewer draws.
 //! Sources: MuJoCo 4.0's own schema (`mj_printSchema`; elements of one name have the attributes of all);
-//! wiki.ros.org/urdf/XML; sdformat.org/spec, 1.12.
+//! wiki.ros.org/urdf/XML; sdformat.org/spec, 1.12; the GDML schema 3.1; OpenMC's description of its geometry.xml, 0.15.
 
 use roxmltree::Node;
 use std::collections::{HashMap, HashSet};
@@ -19,24 +19,25 @@ struct Element<'t> {
 }
 
 /// The elements of a format.
-pub(super) struct Names<'t>(HashMap<&'t str, Element<'t>>);
+pub struct Names<'t>(HashMap<&'t str, Element<'t>>);
 
 impl Names<'static> {
     pub fn of_mjcf() -> Self {
-        Self::of(include_str!("mjcf.names"))
+        Self::of(include_str!("robot/mjcf.names"))
     }
 
     pub fn of_urdf() -> Self {
-        Self::of(include_str!("urdf.names"))
+        Self::of(include_str!("robot/urdf.names"))
     }
 
     pub fn of_sdf() -> Self {
-        Self::of(include_str!("sdf.names"))
+        Self::of(include_str!("robot/sdf.names"))
     }
 }
 
 impl<'t> Names<'t> {
-    fn of(text: &'t str) -> Self {
+    /// The elements that the text of a `.names` file has.
+    pub fn of(text: &'t str) -> Self {
         let mut all: HashMap<&str, Element> = HashMap::new();
         let mut element = "";
         for line in text.lines() {
@@ -141,6 +142,25 @@ mod tests {
             "<box> has no element <sizes>: it is left out",
         ];
         assert_eq!(told(&Names::of_sdf(), sdf), expected);
+        let gdml = "<gdml xmlns:xsi='s' xsi:noNamespaceSchemaLocation='g.xsd'><define><quantity name='q' value='1' unt='cm'/></define>\
+                    <materials><any at='all'/></materials><solids><box name='b' x='1' y='1' z='1' lunt='cm'/><polycone name='p'>\
+                    <zplane rmn='1' z='0' rmax='2'/></polycone></solids><structure><volume name='v'><physvol copynumbr='1'/></volume>\
+                    </structure></gdml>";
+        let expected = [
+            "<quantity> has no attribute \"unt\": it is left out",
+            "<box> has no attribute \"lunt\": it is left out",
+            "<zplane> has no attribute \"rmn\": it is left out",
+            "<physvol> has no attribute \"copynumbr\": it is left out",
+        ];
+        assert_eq!(told(&Names::of(include_str!("gdml/gdml.names")), gdml), expected);
+        let openmc = "<geometry><surface id='1' type='sphere' coeffs='0 0 0 1' boundry='vacuum'/><cell id='1'><material>1</material>\
+                      <regon>-1</regon></cell><cell id='2' translaton='1 0 0' fill='3'/></geometry>";
+        let expected = [
+            "<surface> has no attribute \"boundry\": it is left out",
+            "<cell> has no element <regon>: it is left out",
+            "<cell> has no attribute \"translaton\": it is left out",
+        ];
+        assert_eq!(told(&Names::of(include_str!("openmc/openmc.names")), openmc), expected);
         let with_prefix = "<robot xmlns:drake='d' name='r'><link name='a'><drake:more of='it'/></link></robot>";
         assert!(told(&Names::of_urdf(), with_prefix).is_empty());
     }
