@@ -4,7 +4,7 @@
 //! the objects of the one before, each with its end alone, and take all of the last step: then the end of an object is what that
 //! batch says, and only the last two have anything to tell. They are kept as they are, and worked out when somebody asks.
 
-use contactd_proto::control::{Command, Facets, ModelFile, ObjectSpec, WireFrame, WireRule, WireTrack};
+use contactd_proto::control::{Command, Facets, ModelFile, ObjectSpec, WireFrame, WirePose, WireRule, WireTrack};
 use contactd_proto::{MotionState, PoseRecord, Rule, Tracks};
 use std::collections::BTreeMap;
 
@@ -28,6 +28,9 @@ pub struct Journal {
     sent: (Vec<PoseRecord>, bool, f64),
     /// How many of them, from the last one back, are not in the tracks yet.
     unread: usize,
+    /// What objects were before an act of several commands that is under way, of those that it has given other frames: where their models
+    /// lie in them, and how they moved.
+    before: Option<BTreeMap<u32, (WirePose, MotionState)>>,
 }
 
 impl Journal {
@@ -55,9 +58,32 @@ impl Journal {
     pub fn reframed(&mut self, frame: &WireFrame) {
         // The server accepted it, so its poses are some.
         if let (Ok((place, pose)), Some(spec)) = (frame.checked(), self.objects.get_mut(&frame.object)) {
-            spec.place = place.into();
+            let former = std::mem::replace(&mut spec.place, place.into());
             self.settle();
+            if let (Some(before), Some(motion_state)) = (&mut self.before, self.tracks.get(frame.object)) {
+                before.entry(frame.object).or_insert((former, *motion_state));
+            }
             self.tracks.put(frame.object, MotionState::resting(pose));
+        }
+    }
+
+    /// An act of several commands begins.
+    pub fn begin(&mut self) {
+        self.before = Some(BTreeMap::new());
+    }
+
+    /// It has ended.
+    pub fn end(&mut self) {
+        self.before = None;
+    }
+
+    /// It was cut short: a successor is told what was before it, to the bit.
+    pub fn undo(&mut self) {
+        for (id, (place, motion_state)) in self.before.take().unwrap_or_default() {
+            if let Some(spec) = self.objects.get_mut(&id) {
+                spec.place = place;
+                self.tracks.put(id, motion_state);
+            }
         }
     }
 

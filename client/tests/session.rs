@@ -1,6 +1,6 @@
 //! What a session keeps, and what it tells the other side, when calls fail: on a transport that fails as it is told.
 
-use contactd_client::proto::control::{Answer, Command, WireTrack};
+use contactd_client::proto::control::{Answer, Command, WireFrame, WireTrack};
 use contactd_client::proto::{ContactRecord, ErrorCode, Pose, PoseRecord, StepReply, StepRequest};
 use contactd_client::transport::{Opened, Transport};
 use contactd_client::{Error, MassOptions, Object, Session};
@@ -17,6 +17,8 @@ const LONG: Duration = Duration::from_secs(60);
 struct Script {
     opens: VecDeque<Error>,
     commands: VecDeque<Error>,
+    /// Commands that go well before these.
+    well: usize,
     answers: VecDeque<Result<(), Error>>,
     /// What the other side was told and asked.
     log: Vec<Said>,
@@ -56,12 +58,26 @@ impl Transport for Scripted {
     }
 
     fn command(&mut self, command: Command, _: Duration) -> Result<Answer, Error> {
+        // Whoever takes another frame rests where it was, and lies in that frame in some way.
+        let done = match &command {
+            Command::Carry { object, .. } => Answer::Reframed(WireFrame {
+                object: *object,
+                place: Pose::at(DVec3::Y).into(),
+                pose: Pose::at(DVec3::Z).into(),
+            }),
+            _ => Answer::Done,
+        };
         self.say(Said::Command(command));
-        match self.script.borrow_mut().commands.pop_front() {
+        let mut script = self.script.borrow_mut();
+        if script.well > 0 {
+            script.well -= 1;
+            return Ok(done);
+        }
+        match script.commands.pop_front() {
             Some(Error::Refused { code, .. }) => {
                 Ok(Answer::Refused { code: code.number(), index: u32::MAX, detail: String::new() })
             }
-            failure => failure.map_or(Ok(Answer::Done), Err),
+            failure => failure.map_or(Ok(done), Err),
         }
     }
 
@@ -268,4 +284,69 @@ fn closing_waits_for_the_step_in_flight() {
     session.begin_step(1).unwrap();
     assert_eq!(session.close(), Ok(()));
     assert_eq!(script.borrow().log, [close]);
+}
+
+/// A server that is lost in the middle of an act of several commands: its successor is told what was before the act, to the bit, and
+/// nothing of the act is owed.
+#[test]
+fn an_act_that_was_cut_short_is_not_in_the_replay() {
+    type Act = fn(&mut Session<Scripted>) -> Result<(), Error>;
+    let attach: Act = |session| session.attach(2, 1, &[]);
+    let detach: Act = |session| session.detach(2);
+    let remove: Act = |session| session.remove_object(1);
+    for loss in [Error::ServerLost, Error::ReplyLost, Error::refused(ErrorCode::SessionGone)] {
+        for (is_attached, act, commands) in [(false, attach, 2), (true, detach, 3), (true, remove, 3)] {
+            // The replay of a session that was lost in the act's k-th command; of one that was lost before it.
+            let replay_of = |k: Option<usize>| {
+                let (mut session, script) = scripted();
+                assert_eq!(session.add_object(Object::new("part", 1)), Ok(2));
+                if is_attached {
+                    assert_eq!(attach(&mut session), Ok(()));
+                }
+                assert_eq!(step(&mut session, &script, 1, Ok(())), None);
+                assert_eq!(step(&mut session, &script, 2, Ok(())), None);
+                script.borrow_mut().commands.push_back(loss.clone());
+                script.borrow_mut().well = k.unwrap_or(0);
+                match k {
+                    Some(_) => assert_eq!(act(&mut session), Err(loss.clone()), "{k:?}"),
+                    None => assert_eq!(session.set_resolution(Some(1e-6)), Err(loss.clone())),
+                }
+                assert_eq!(
+                    script.borrow().commands.len() + script.borrow().well,
+                    0,
+                    "{k:?}: the act has fewer commands"
+                );
+                script.borrow_mut().log.clear();
+                assert_eq!(session.reconnect(LONG), Ok(()));
+                let log = script.borrow().log.clone();
+                let is_frame = |said: &Said| matches!(said, Said::Command(Command::Carry { .. } | Command::Reframe(_)));
+                assert!(!log.iter().any(is_frame), "{k:?}: {log:?}");
+                assert_eq!((session.carrier(2), act(&mut session)), (is_attached.then_some(1), Ok(())));
+                // What is owed of rules comes behind it, and is theirs to the word.
+                let end = log.iter().position(|said| matches!(said, Said::Command(Command::Restore(_))));
+                log[..=end.expect("a replay")].to_vec()
+            };
+            let before = replay_of(None);
+            for k in 0..commands {
+                assert_eq!(replay_of(Some(k)), before, "{k}");
+            }
+        }
+    }
+}
+
+/// An object is gone once the server has said so, though the session is lost before the rules are told.
+#[test]
+fn a_carrier_that_is_gone_is_not_asked_for_again() {
+    let (mut session, script) = scripted();
+    assert_eq!(session.add_object(Object::new("part", 1)), Ok(2));
+    assert_eq!(session.attach(2, 1, &[]), Ok(()));
+    script.borrow_mut().commands.push_back(Error::ServerLost);
+    script.borrow_mut().well = 3;
+    assert_eq!(session.remove_object(1), Ok(()));
+    assert_eq!((script.borrow().commands.len(), session.carrier(2)), (0, None));
+    script.borrow_mut().log.clear();
+    assert_eq!(session.reconnect(LONG), Ok(()));
+    let adds = |said: &&Said| matches!(said, Said::Command(Command::AddObject(_)));
+    assert_eq!(script.borrow().log.iter().filter(adds).count(), 1);
+    assert!(matches!(script.borrow().log.last(), Some(Said::Command(Command::SetRules(_)))));
 }

@@ -3,6 +3,7 @@
 //! All of it is the client's: a part that is attached gets each record of its carrier, in the same batch; pairs that are allowed to
 //! meet are exceptions of the rules. So the server, recordings and a replay know of records and rules alone.
 
+use super::stage::Stage;
 use super::{Session, unexpected};
 use crate::transport::Transport;
 use crate::{Error, Object};
@@ -259,15 +260,16 @@ impl<T: Transport> Session<T> {
         let (root, held) = (self.company.root_of(carrier), Pose::IDENTITY);
         let touching = touching.iter().copied().chain([carrier]).collect();
         let before = self.company.attached.clone();
-        self.company.attached.insert(part, Attached { carrier, root, held, touching });
-        self.company.change();
-        let done = match self.company.is_ambiguous() {
-            true => Err(AMBIGUOUS),
-            false => {
-                self.company.owes_frames = true;
-                self.hand_over(part, root).and_then(|()| self.tell_rules())
+        let done = self.as_one(|session| {
+            session.company.attached.insert(part, Attached { carrier, root, held, touching });
+            session.company.change();
+            if session.company.is_ambiguous() {
+                return Err(AMBIGUOUS);
             }
-        };
+            session.company.owes_frames = true;
+            session.hand_over(part, root)?;
+            session.tell_rules()
+        });
         // Refused before any part had another frame, as for an object that is not there: nothing is owed.
         let is_refused = matches!(done, Err(Error::Refused { .. })) && self.company.framed_at.is_none();
         self.company.owes_frames &= done.is_err() && !is_refused;
@@ -288,8 +290,34 @@ impl<T: Transport> Session<T> {
             return Ok(());
         }
         self.check_advance()?;
-        self.release(part)?;
-        self.tell_rules()
+        self.as_one(|session| {
+            session.release(part)?;
+            session.tell_rules()
+        })
+    }
+
+    /// Several commands that are one act. Where the session is lost on the way all is as it was before, and so is what a successor is told:
+    /// asked again the act is that of a session that was not lost, to the bit.
+    fn as_one(&mut self, act: impl FnOnce(&mut Self) -> Result<(), Error>) -> Result<(), Error> {
+        let company = &self.company;
+        let before = (company.attached.clone(), company.framed_at, company.owes_frames);
+        let places: Vec<(u32, Pose)> = company.members.iter().map(|(id, member)| (*id, member.place)).collect();
+        self.journal.begin();
+        let done = act(self);
+        if done.is_ok() || !matches!(self.stage, Stage::Lost) {
+            self.journal.end();
+            return done;
+        }
+        self.journal.undo();
+        let company = &mut self.company;
+        (company.attached, company.framed_at, company.owes_frames) = before;
+        for (id, place) in places {
+            if let Some(member) = company.members.get_mut(&id) {
+                member.place = place;
+            }
+        }
+        company.change();
+        done
     }
 
     /// The object at the end of a part's chain, whose records it gets; `None` where it is not attached.
@@ -409,10 +437,12 @@ impl<T: Transport> Session<T> {
         if !carried.is_empty() {
             self.check_advance()?;
         }
-        for part in carried {
-            self.release(part)?;
-        }
-        self.done(Command::RemoveObject(object))?;
+        self.as_one(|session| {
+            for part in carried {
+                session.release(part)?;
+            }
+            session.done(Command::RemoveObject(object))
+        })?;
         self.journal.removed(object);
         let company = &mut self.company;
         company.members.remove(&object);
@@ -422,8 +452,9 @@ impl<T: Transport> Session<T> {
             company.attached.values_mut().for_each(|attached| attached.touching.retain(|id| *id != object));
             company.change();
         }
-        // Another object of its name is none of them.
-        self.settle()
+        // Another object of its name is none of them. The object is gone, whatever becomes of the rules: where the session is lost meanwhile
+        // they are told after the replay.
+        self.settle().or_else(|e| if matches!(self.stage, Stage::Lost) { Ok(()) } else { Err(e) })
     }
 
     /// Ends that a part is attached: it has its own frame again, where it stands, and what hangs on it has that one.

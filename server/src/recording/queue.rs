@@ -56,6 +56,8 @@ pub struct Load {
     pub without_picture: AtomicU64,
     pub written: AtomicU64,
     pub stop: AtomicBool,
+    /// Nothing is taken any more.
+    pub over: AtomicBool,
     pub failure: Mutex<String>,
 }
 
@@ -124,7 +126,7 @@ impl Recorder {
     /// Takes an item, or leaves it.
     fn push(&self, item: Item) -> Result<(), Item> {
         let size = item.size();
-        if self.load.bytes.load(Relaxed) + size > LIMIT {
+        if self.load.over.load(Relaxed) || self.load.bytes.load(Relaxed) + size > LIMIT {
             return Err(item);
         }
         self.load.sent(size);

@@ -68,8 +68,12 @@ impl Recorder {
             yield_to_others();
             let sink = Counted { sink, load: load.clone() };
             let mut pending = 0;
-            if let Err(e) = write(sink, &from, &load, words, &mut pending) {
-                load.lost(pending + from.try_iter().filter(|item| matches!(item, Item::Step(_))).count() as u64);
+            let written = write(sink, &from, &load, words, &mut pending);
+            // What was sent while it ended nobody reads.
+            load.over.store(true, Relaxed);
+            let left = from.try_iter().filter(|item| matches!(item, Item::Step(_))).count() as u64;
+            load.lost(left + if written.is_err() { pending } else { 0 });
+            if let Err(e) = written {
                 *load.failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner) =
                     format!("{path}: {}", super::with_cause(&e));
             }
@@ -174,6 +178,8 @@ struct File {
     /// Keys of the contents that stand in the file, by where they lie in memory; held, so that nothing else comes to lie there.
     written: HashMap<usize, (Key, Arc<Content>)>,
     sessions: BTreeMap<u64, Followed>,
+    /// Steps that were written.
+    steps: u64,
     bytes: Vec<u8>,
 }
 
@@ -194,7 +200,7 @@ impl File {
             let schema = writer.add_schema(name, "jsonschema", schema.as_bytes())?;
             channels.insert(topic, (writer.add_channel(schema, topic, encoding::JSON, &BTreeMap::new())?, 0));
         }
-        Ok(Self { writer, channels, written: HashMap::new(), sessions: BTreeMap::new(), bytes: Vec::new() })
+        Ok(Self { writer, channels, written: HashMap::new(), sessions: BTreeMap::new(), steps: 0, bytes: Vec::new() })
     }
 
     fn message(&mut self, topic: &'static str, time: u64, bytes: &[u8]) -> McapResult<()> {
@@ -297,6 +303,7 @@ impl File {
         let mut bytes = std::mem::take(&mut self.bytes);
         step.write(&mut bytes);
         self.message(topic::STEP, step.time, &bytes)?;
+        self.steps += 1;
         self.bytes = bytes;
         let time = step.time;
         let Some(followed) = self.sessions.get_mut(&step.session) else { return Ok(()) };
@@ -324,7 +331,7 @@ impl File {
     /// Says how it went, and completes the file.
     fn end(mut self, load: &Load) -> McapResult<()> {
         let numbers = [
-            ("steps", load.steps.load(Relaxed)),
+            ("steps", self.steps),
             ("dropped", load.dropped.load(Relaxed)),
             ("without_picture", load.without_picture.load(Relaxed)),
         ];

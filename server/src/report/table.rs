@@ -92,6 +92,9 @@ impl Answer {
             }
             1.0 => (None, "proven clear for the whole step".into()),
             t if t <= 0.0 => (None, "no part of the step proven clear".into()),
+            t if self.pairs.iter().any(|p| p.discrete) => {
+                (None, format!("proven clear until t = {}, discrete pairs where the step ends", time(t)))
+            }
             t => (None, format!("proven clear until t = {}", time(t))),
         });
         let pairs = many(self.pairs.len(), "pair");

@@ -513,6 +513,9 @@ fn summary(pairs: &[PairTold], safe: f64) -> String {
         }
         1.0 => format!("{what}; the whole step is proven clear."),
         t if t <= 0.0 => format!("{what}; no part of the step is proven clear."),
+        t if pairs.iter().any(|p| p.answer.discrete) => {
+            format!("{what}; pairs are proven clear until t = {}, discrete ones at the end alone.", time(t))
+        }
         t => format!("{what}; all pairs are proven clear until t = {}.", time(t)),
     }
 }

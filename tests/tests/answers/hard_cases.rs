@@ -781,3 +781,28 @@ fn what_flies_by_faster_than_rounding_tells_is_not_told_clear() {
     }
     assert!(met >= 36 && open >= 6, "{met} met, {open} open");
 }
+
+/// Resolutions that were asked for and leave a ball no inside: a start that is just twice as deep is told, and no search begins anew for
+/// ever.
+#[test]
+fn a_start_at_just_twice_a_coarse_resolution_is_told() {
+    let models = [Model::new(Recipe::cuboid(5.0, 5.0, 5.0).build()), Model::new(Recipe::sphere(1.0).build())];
+    let placed = Placed { place: Pose::IDENTITY, motion: still() };
+    for strategies in [Strategies::default(), SEARCH_ALONE] {
+        for resolution in [0.5, 0.5 - 1e-12, 0.3, 0.25] {
+            let query = PairQuery {
+                a: PlacedModel { model: &models[0], placed },
+                b: PlacedModel { model: &models[1], placed },
+                resolution,
+                cell_limit: 100_000,
+                strategies,
+                query_options: QueryOptions::DEPTH,
+            };
+            let o = earliest_contact(&query, &mut Scratch::default());
+            // No point is deeper than 1.
+            let expected = if resolution < 0.49 { Status::Overlap } else { Status::Clear };
+            assert_eq!(o.status(), expected, "{resolution}: {o:?}");
+            assert!(o.counters.cells < 1000, "{resolution}: {o:?}");
+        }
+    }
+}

@@ -110,6 +110,8 @@ const LARGEST_COARSE: f64 = 1e-3;
 
 /// Resolutions that the thinnest primitive is thick at least, where rounding raises them: deeper than that it has no inside left.
 const LEAST_THICKNESS: f64 = 4.0;
+/// What a raise is a multiple of the resolution before it by at least, where it is rounding that is large.
+const SWALLOWED: f64 = 1.5;
 
 /// What a search that took too long has proven: no point is `depth` deep in both bodies before `free_until`, or before the contact found's
 /// own goal.
@@ -219,7 +221,7 @@ impl<'a> PairSearch<'a> {
         // Far out, or on the way there, rounding may take more than there is of a body: then no depth tells anything of it.
         let is_raised = task.delta > query.resolution;
         let state = match quick {
-            _ if is_raised && task.thinnest() <= LEAST_THICKNESS * task.delta => {
+            Quick::Open(_) if is_raised && task.thinnest() <= LEAST_THICKNESS * task.delta => {
                 let verdict = Verdict::Undecided { time_lower: 0.0 };
                 State::Reported(Outcome { verdict, resolution: task.delta, ..*before }, scratch)
             }
@@ -387,6 +389,7 @@ impl<'a> PairSearch<'a> {
 
     /// How the search ends, and the cells' worth of work that it took; `None` where it comes to `until` first.
     fn ending(&mut self, until: f64) -> Option<(Ending, u64)> {
+        let is_last = self.raised >= SUNK || self.next_raise().is_none();
         let (ending, counters) = match &mut self.state {
             State::Posed(..) | State::Overlap(..) | State::Reported(..) => return None,
             State::Ended(Some(Ending::Contact(found)), ..) if found.goal > until => return None,
@@ -394,7 +397,7 @@ impl<'a> PairSearch<'a> {
             State::Searching(search) => {
                 let ending = search.run(until)?;
                 // Rounding that no larger depth helps against: what is proven and a witness behind it are the answer.
-                let last = matches!(ending, Ending::Rounding(_)) && self.raised >= SUNK;
+                let last = matches!(ending, Ending::Rounding(_)) && is_last;
                 let ending = if last { search.rescue().unwrap_or(ending) } else { ending };
                 (ending, search.take_counters())
             }
@@ -504,10 +507,7 @@ impl<'a> PairSearch<'a> {
             2.0 * resolution >= enough
         };
         let Some(skipped) = left.iter().position(is_enough) else { return false };
-        for _ in 0..=skipped {
-            self.raise();
-        }
-        true
+        !self.swallows(resolution) && (0..=skipped).all(|_| self.raise())
     }
 
     /// Leaves open what comes after `t`, unless the search begins `anew`; says whether it does.
@@ -620,13 +620,21 @@ impl<'a> PairSearch<'a> {
         true
     }
 
+    /// The resolution after the next raise; `None` where that was done often enough, and where rounding would take more than there is of a
+    /// body.
+    fn next_raise(&self) -> Option<f64> {
+        let more = RAISES.get(self.raised)?;
+        Some(raised(self.resolution, *more, self.task.rounding)).filter(|resolution| !self.swallows(*resolution))
+    }
+
+    /// True for a raised resolution that is so by rounding, not because it was asked for, and that leaves a primitive no inside.
+    fn swallows(&self, resolution: f64) -> bool {
+        resolution > SWALLOWED * self.resolution && self.task.thinnest() <= LEAST_THICKNESS * resolution
+    }
+
     /// Raises the resolution, unless that was done often enough.
     fn raise(&mut self) -> bool {
-        let Some(more) = RAISES.get(self.raised) else { return false };
-        let resolution = raised(self.resolution, *more, self.task.rounding);
-        if self.task.thinnest() <= LEAST_THICKNESS * resolution {
-            return false;
-        }
+        let Some(resolution) = self.next_raise() else { return false };
         self.raised += 1;
         self.resolution = resolution;
         self.outcome.resolution = self.resolution;
