@@ -335,6 +335,20 @@ fn touching_is_decided_by_the_margin() {
     assert_eq!((o.status(), o.touching), (Status::Contact, true));
     assert!(o.time() < 1e-15, "{o:?}");
     assert_eq!(found.regions[0].points.len(), 4);
+    // A ball in a hole, by its wall, and one over the plate: no cell is asked.
+    let plate = Recipe::cuboid(1.0, 1.0, 0.25).minus(Recipe::cylinder(0.5, 1.0));
+    for place in [dvec3(0.19, 0.0, 0.1), dvec3(0.8, 0.8, 0.56)] {
+        let ball = rest(plate.clone(), Recipe::sphere(0.3), Pose::at(place));
+        for (margin, is_near) in [(1e-3, false), (0.6e-2, false), (0.999e-2, false), (1.001e-2, true), (0.1, true)] {
+            let (within, cells) = touching(&ball.query(), margin, &mut Scratch::default());
+            assert_eq!(
+                (matches!(within, Within::Witness(_)), within == Within::Apart),
+                (is_near, !is_near),
+                "{margin}"
+            );
+            assert_eq!(cells, 0, "{place}, {margin}");
+        }
+    }
     // A curved pair that comes near only at one point is proven apart just above the threshold.
     let ball = rest(floor(), Recipe::sphere(0.5), Pose::at(dvec3(0.1, 0.2, 0.501)));
     assert_eq!(touching(&ball.query(), 0.999e-3, &mut Scratch::default()).0, Within::Apart);

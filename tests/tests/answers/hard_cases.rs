@@ -8,6 +8,7 @@ use contactd::contact::{
 };
 use contactd::motion::Placed;
 use contactd::octree::Model;
+use contactd_proto::contact_record::NO_FACE;
 use contactd_proto::{Motion, Pose};
 use contactd_tests::engine::{
     ReportedPoint as _, SEARCH_ALONE, ask, ask_scene_with, cell_ceiling, differences, point_mut, question_of,
@@ -746,6 +747,52 @@ fn a_ball_that_starts_in_a_face_is_told_in_front_of_the_search() {
         told[usize::from(o.status() == Status::Overlap)] += 1;
     }
     assert!(told.iter().all(|n| *n > 0), "{told:?}");
+}
+
+/// The same of a ball over the edge of a slab, its corner and the rim of its hole, a little or hardly deep in it, or hardly apart.
+#[test]
+fn a_ball_that_starts_in_an_edge_is_told_in_front_of_the_search() {
+    let slab = Recipe::cuboid(4.0, 4.0, 0.5).minus(Recipe::cylinder(0.6, 2.0));
+    let up = |way: DVec3| way.normalize();
+    let edges = [
+        (dvec3(4.0, 0.3, 0.5), up(dvec3(1.0, 0.0, 1.3))),
+        (dvec3(4.0, -4.0, 0.5), up(dvec3(0.4, -0.5, 0.6))),
+        (dvec3(0.0, 0.6, 0.5), up(dvec3(0.0, -0.3, 0.8))),
+    ];
+    let mut told = [0; 2];
+    for (foot, away) in edges {
+        for depths in [-6.0, -2.0, 0.5, 1.9, 2.2, 2.6, 3.7, 5.2, 8.0, 1e3] {
+            let falls = |resolution: f64| {
+                let start = foot + away * (0.5 - depths * resolution);
+                scene(
+                    slab.clone(),
+                    still(),
+                    Recipe::sphere(0.5),
+                    going(start, DQuat::IDENTITY, -1e-3 * away, DVec3::ZERO),
+                )
+            };
+            let s = falls(ask(&falls(0.0)).resolution);
+            let (o, searched) = (ask(&s), ask_scene_with(&s, SEARCH_ALONE));
+            assert_eq!(o.counters.cells, 0, "{foot} {depths}: {o:?}");
+            assert!(searched.counters.cells > 0, "{foot} {depths}: {searched:?}");
+            assert_eq!(
+                (o.status(), o.touching),
+                (searched.status(), searched.touching),
+                "{foot} {depths}: {o:?}\n{searched:?}"
+            );
+            assert!((o.time() - searched.time()).abs() < 1e-9, "{foot} {depths}: {o:?}\n{searched:?}");
+            let faces = o.at();
+            assert!(faces.faces_a != [NO_FACE; 3] && faces.faces_b != [NO_FACE; 3], "{foot} {depths}: {o:?}");
+            told[usize::from(o.status() == Status::Overlap)] += 1;
+        }
+    }
+    assert!(told.iter().all(|n| *n > 3), "{told:?}");
+    // On the rim all around, a little in it: the faces told are those that hold it, of both.
+    let on_rim = going(dvec3(3e-8, -6e-8, 1.3 - 5e-8), DQuat::IDENTITY, -1e-5 * DVec3::Z, DVec3::ZERO);
+    let o = ask(&scene(slab, still(), Recipe::sphere(1.0), on_rim));
+    let point = o.at();
+    assert_eq!((o.status(), o.counters.cells), (Status::Overlap, 0), "{o:?}");
+    assert!(point.faces_a != [NO_FACE; 3] && point.faces_b != [NO_FACE; 3], "{o:?}");
 }
 
 /// Balls, blocks and a bored block that fly through each other from ever farther away: told exactly, or at a coarser resolution, and not

@@ -7,6 +7,7 @@
 //! both undisplaced bodies, halfway between where x lies in the one and in the other.
 
 use crate::bound::{Bound, Volumes};
+use crate::contact::ball;
 use crate::contact::cavity;
 use crate::contact::certificate::{self, Certificate};
 use crate::contact::convex::ConvexPair;
@@ -265,6 +266,11 @@ pub fn touching(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (Wit
         return (Within::Apart, 0);
     }
     let level = 0.5 * distance;
+    if task.strategies.balls
+        && let Some(within) = ball::within(&task, level)
+    {
+        return (within, 0);
+    }
     task.limit = task.limit.min(region::MOST_CELLS);
     if level > 0.99 * reach(&task) {
         let work = Work::heeding(task.limit, scratch.halt.clone());

@@ -65,3 +65,6 @@ pub const LEAST_ROUNDINGS: f64 = 4.0;
 
 /// Sine of an angle that a double cannot tell from 0: axes within it are one direction.
 pub const PARALLEL: f64 = 1e-15;
+
+/// Cosine below which two directions are at a right angle: what their rounding leaves.
+pub const RIGHT_ANGLE: f64 = 2.0 * f64::EPSILON;

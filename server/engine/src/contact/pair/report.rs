@@ -302,6 +302,10 @@ pub(super) fn fill_overlap(o: &mut Outcome, task: &Task, x: DVec3) {
     // Where the faces that hold it, or those that decide there, are deepest in each other: a short climb does not come to that in a
     // thin overlap.
     let deciding = vec![(Side::A, task.a.deciding(x).1), (Side::B, task.b.deciding(at.b_point(x)).1)];
+    // What bounded a whole box need not hold the point: a climb that begins at the deepest point goes nowhere.
+    if [Side::A, Side::B].iter().any(|side| faces.iter().all(|f| f.0 != *side)) {
+        faces.clone_from(&deciding);
+    }
     for held in [faces.clone(), deciding] {
         let Some(((y, ..), way)) = balance::of_literals(task, &at, &held, x) else { continue };
         work.look(task.a.faces.len() + task.b.faces.len());

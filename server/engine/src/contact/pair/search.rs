@@ -653,7 +653,7 @@ impl<'a> PairSearch<'a> {
         let again = self.coarser > 0 && self.task.strategies.cavities;
         let mut ending = if again { cavity::answer(&mut contacts) } else { None };
         if ending.is_none() && self.task.strategies.balls {
-            ending = ball::answer_of_touching(&mut contacts);
+            ending = ball::answer(&mut contacts);
         }
         let scratch = self.take_scratch();
         if ending.is_some() {
