@@ -145,6 +145,19 @@ fn a_deadline_leaves_undecided_what_is_not_known_by_then() {
     assert!(answers[0].0 == 0 && answers[1].0 > 0, "{answers:?}");
 }
 
+/// The same key is a setting of an engine in one's own process.
+#[test]
+fn an_embedded_engine_keeps_its_deadline() {
+    let undecided = [0, 1].map(|deadline_ms| {
+        let mut session = contactd::embedded(&ServerConfig { deadline_ms, ..ServerConfig::default() }).unwrap();
+        let ids = crowd(&mut session, BALL, 300, &[]);
+        begin(&mut session, &ids, 1);
+        let reply = session.finish(LONG).unwrap();
+        reply.records().iter().filter(|r| r.status == UNDECIDED).count()
+    });
+    assert!(undecided[0] == 0 && undecided[1] > 0, "{undecided:?}");
+}
+
 /// Asks until the server is seen to be at it: true, or to have done it. A request that is given up at once may never be heard.
 fn is_at_work<T>(mut ask: impl FnMut() -> Result<T, Error>) -> bool {
     loop {

@@ -68,6 +68,9 @@ pub unsafe extern "C" fn contactd_load_model_file(
         let format = if format.is_null() { "" } else { unsafe { text(format, "format")? } };
         // SAFETY: the caller's array (1).
         let bytes = unsafe { row(bytes, length, "bytes")? };
+        if Vec::<u8>::new().try_reserve_exact(length).is_err() {
+            return Err(Failure::argument(format!("bytes: {length} of them do not fit into memory")));
+        }
         // SAFETY: the caller's variable (1).
         let model = unsafe { place(model, "model")? };
         let file = ModelFile::new(name, format, bytes);

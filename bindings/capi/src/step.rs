@@ -39,9 +39,13 @@ pub unsafe extern "C" fn contactd_set_options(session: *mut Session, options: *c
         // SAFETY: the caller's structure (1).
         let o = unsafe { given(options, "options")? };
         reserved(o.reserved, "options.reserved")?;
+        let dt = o.dt;
+        if !(dt.is_finite() && dt >= 0.0) {
+            return Err(Failure::argument(format!("expected options.dt of 0 seconds or more, found {dt}")));
+        }
         state.session.options = StepOptions {
-            advance: o.advance,
-            dt: o.dt,
+            advance: fraction(o.advance, "options.advance")?,
+            dt,
             first: flag(o.first, "options.first")?,
             details: flag(o.details, "options.details")?,
             clear: flag(o.clear, "options.clear")?,
@@ -56,11 +60,19 @@ pub unsafe extern "C" fn contactd_set_options(session: *mut Session, options: *c
     unsafe { on(session, call) }
 }
 
+/// A fraction of a step.
+fn fraction(value: f64, what: &str) -> Result<f64, Failure> {
+    if (0.0..=1.0).contains(&value) {
+        return Ok(value);
+    }
+    Err(Failure::argument(format!("expected {what} of 0 to 1, found {value}")))
+}
+
 /// Sets the option `advance` alone: the fraction 0..1 of its previous step at which every object stands before the next one.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn contactd_set_advance(session: *mut Session, advance: f64) -> i32 {
     let call = |state: &mut State| {
-        state.session.options.advance = advance;
+        state.session.options.advance = fraction(advance, "advance")?;
         Ok(())
     };
     // SAFETY: the caller's handle (3).

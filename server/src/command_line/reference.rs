@@ -196,7 +196,8 @@ fn settings() -> String {
         rows += &(hanging(&line, "  ") + "\n");
     }
     let about = "A server's settings are a TOML file: `contactd serve --config FILE`. Options of the command line count for more. \
-                 The same keys are the settings of an embedded engine. Every key is known or refused with its place.";
+                 The same keys are the settings of an embedded engine, but for those that only a server has a use for: clients, waiting, \
+                 files and ports. Every key is known or refused with its place.";
     page("Server settings", about, &[rows])
 }
 

@@ -6,6 +6,7 @@
 use super::font::{Pattern, machine};
 use super::openscad::{self, Access};
 use super::{Facets, Import, ImportError, Limits, csg, mesh};
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
@@ -136,10 +137,16 @@ impl<'a> Source<'a> {
 pub fn read_bytes(path: &Path, limits: &Limits) -> Result<Vec<u8>, ImportError> {
     let file = path.display().to_string();
     let read = |reason| ImportError::Read { file: file.clone(), reason };
-    if std::fs::metadata(path).map_err(read)?.len() > limits.bytes as u64 {
-        return Err(ImportError::Large { file, limit: limits.bytes });
+    let large = || ImportError::Large { file: file.clone(), limit: limits.bytes };
+    let length = std::fs::metadata(path).map_err(read)?.len();
+    if length > limits.bytes as u64 {
+        return Err(large());
     }
-    std::fs::read(path).map_err(read)
+    // A device or a pipe has no length, and perhaps no end.
+    let mut bytes = Vec::with_capacity(length as usize);
+    let opened = std::fs::File::open(path).map_err(read)?;
+    opened.take(limits.bytes as u64 + 1).read_to_end(&mut bytes).map_err(read)?;
+    if bytes.len() > limits.bytes { Err(large()) } else { Ok(bytes) }
 }
 
 /// A file and those that it names.

@@ -17,6 +17,7 @@ use contactd_proto::pose_record::{self, PoseRecord, unit_quaternion};
 use contactd_proto::{Detect, Motion, MotionState, Pose, Report, Rule};
 use glam::DVec3;
 use std::collections::{HashMap, HashSet};
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
@@ -156,11 +157,17 @@ impl SceneError {
 pub fn read_scene(path: &Path) -> Result<Scene, SceneError> {
     let file = path.display().to_string();
     let read = |reason| SceneError::Read { file: file.clone(), reason };
+    let large = || read(std::io::Error::other(format!("more than {MAX_TEXT} bytes")));
     if std::fs::metadata(path).map_err(read)?.len() > MAX_TEXT {
-        let reason = std::io::Error::other(format!("more than {MAX_TEXT} bytes"));
-        return Err(SceneError::Read { file, reason });
+        return Err(large());
     }
-    let text = std::fs::read_to_string(path).map_err(read)?;
+    // A device or a pipe has no length, and perhaps no end.
+    let mut text = String::new();
+    let opened = std::fs::File::open(path).map_err(read)?;
+    opened.take(MAX_TEXT + 1).read_to_string(&mut text).map_err(read)?;
+    if text.len() as u64 > MAX_TEXT {
+        return Err(large());
+    }
     Scene::parse(&file, &text, path.parent().unwrap_or(Path::new("")))
 }
 

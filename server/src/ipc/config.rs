@@ -5,6 +5,10 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// The part of a deadline that is left to the reply.
+const REPLY_PART: u32 = 10;
 
 /// Settings of a server, as a TOML file may give them.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
@@ -104,6 +108,12 @@ impl Default for ServerConfig {
 }
 
 impl ServerConfig {
+    /// When a step that begins now must have been searched; `None` where work alone limits it.
+    pub(super) fn deadline(&self) -> Option<Instant> {
+        let whole = Duration::from_millis(self.deadline_ms);
+        (self.deadline_ms > 0).then(|| Instant::now() + (whole - whole / REPLY_PART))
+    }
+
     /// Reads a TOML file.
     ///
     /// # Errors

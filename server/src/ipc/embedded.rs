@@ -5,7 +5,7 @@ use super::models::Models;
 use super::recordings;
 use super::scene::{CommandOutcome, Import, Scene, refused};
 use crate::recording::{Content, Recorder, Tap};
-use crate::world::Refusal;
+use crate::world::{Crew, Heed, Refusal};
 use contactd_client::transport::{Opened, Transport};
 use contactd_client::{Error, Session};
 use contactd_proto::control::{Answer, Command, RecordingOrder, RecordingStatus};
@@ -28,6 +28,8 @@ pub struct Embedded {
     records: Vec<PoseRecord>,
     slots: Vec<ContactRecord>,
     reply: Option<StepReply>,
+    /// The threads of steps that have a deadline.
+    crew: Arc<Crew>,
 }
 
 /// A recording in the caller's process.
@@ -78,6 +80,7 @@ impl Embedded {
             records: Vec::new(),
             slots: Vec::new(),
             reply: None,
+            crew: Arc::new(Crew::new(std::thread::available_parallelism().map_or(1, usize::from))),
         }
     }
 
@@ -182,8 +185,9 @@ impl Transport for Embedded {
     }
 
     fn send(&mut self, request: StepRequest) -> Result<(), Error> {
+        let heed = self.config.deadline().map(|deadline| Heed::new(Some(deadline), self.crew.clone()));
         let Self { scene, records, slots, .. } = self;
-        let reply = scene.step(&request, records, None, |n, reply, slot| {
+        let reply = scene.step(&request, records, heed.as_ref(), |n, reply, slot| {
             slots.clear();
             slots.extend((0..n).map(slot));
             reply

@@ -52,8 +52,6 @@ const CANCELLED: Duration = Duration::from_secs(2);
 const COMPLETED: Duration = Duration::from_secs(20);
 /// How many sessions that were ended from outside are remembered.
 const REMEMBERED: usize = 1000;
-/// The part of a deadline that is left to the reply.
-const REPLY_PART: u32 = 10;
 
 /// Serves until `stop` is set and the steps that were asked for before are answered; gives back what the last leader held, to be dropped by the caller.
 pub fn run<P: Port>(lead: Box<Lead<P>>, stop: &AtomicBool) -> Option<Box<Lead<P>>> {
@@ -362,7 +360,7 @@ impl<P: Port> Lead<P> {
         scene.record(self.recordings.number(), || self.recordings.tap(request.session));
         if self.config.deadline_ms > 0 {
             let has_left = session.thread.is_some();
-            session.heed = session.heed.next(Some(deadline(&self.config)));
+            session.heed = session.heed.next(self.config.deadline());
             if has_left {
                 session.heed.leave();
             }
@@ -660,12 +658,6 @@ fn debug_refusal(log: &mut Log, id: u64, said: &Answer) {
 fn sentence(refusal: &Refusal) -> String {
     let detail = if refusal.detail.is_empty() { String::new() } else { format!(": {}", refusal.detail) };
     format!("{}{detail}", refusal.code)
-}
-
-/// When a step that begins now must have been searched.
-fn deadline(config: &ServerConfig) -> Instant {
-    let whole = Duration::from_millis(config.deadline_ms);
-    Instant::now() + (whole - whole / REPLY_PART)
 }
 
 /// Frees a scene on another thread: a large one takes longer than a step may wait.

@@ -371,6 +371,14 @@ fn what_is_left_out_is_reported() {
             "cube(1); multmatrix([[1,0,0,nan],[0,1,0,0],[0,0,1,0],[0,0,0,1]]) { cube(2); }",
             "1:10: multmatrix that holds no finite numbers: left out, as OpenSCAD does",
         ),
+        (
+            "cube(1); multmatrix([[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,0]]) { cube(2); }",
+            "1:10: multmatrix with a 0 as its last number: left out, as OpenSCAD does",
+        ),
+        (
+            "multmatrix([[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,-0.02,1]]) { cube(1); }",
+            "1:12: the last row of a matrix begins with other numbers than 0: ignored, as OpenSCAD does (by 2.0e-2)",
+        ),
         ("cube(1); polyhedron(points = undef, faces = undef);", "1:10: polyhedron without points: left out"),
         (
             "cube(1); polyhedron([[0,0,0],[0,1,0],[1,0,0],[0,0,nan]], [[0,2,1],[0,1,3],[1,2,3],[2,0,3]]);",

@@ -23,7 +23,7 @@ use super::{Facets, Import, Limits, Place, Problem};
 use super::{resize, text, twist};
 use crate::import::{Attachment, Note};
 use crate::math::Aabb;
-use crate::math::tolerance::{ROUNDING, SIMILARITY};
+use crate::math::tolerance::ROUNDING;
 use crate::solid::Op;
 use glam::{DAffine3, DMat3, DVec3};
 use std::collections::HashMap;
@@ -502,9 +502,9 @@ impl<'a> Lowering<'a> {
         if holds_no_finite(value) {
             return Ok(Err("that holds no finite numbers"));
         }
-        let m = matrix(value)?;
+        let Some(m) = matrix(value)? else { return Ok(Err("with a 0 as its last number")) };
         if m[3][..3] != [0.0; 3] {
-            let text = "the last row of a matrix is not quite [0, 0, 0, 1]: ignored, as OpenSCAD does";
+            let text = "the last row of a matrix begins with other numbers than 0: ignored, as OpenSCAD does";
             let amount = m[3][..3].iter().fold(0.0, |a: f64, x| a.max(x.abs()));
             self.note(value.at, text, Some(amount));
         }
@@ -586,8 +586,8 @@ fn holds_no_finite(value: &Value) -> bool {
     matches!(&value.kind, ValueKind::List(rows) if rows.iter().any(of))
 }
 
-/// Four rows of four; the last one (0, 0, 0, w), within `SIMILARITY`, divides the others.
-fn matrix(value: &Value) -> Result<[[f64; 4]; 4]> {
+/// Four rows of four, divided by the last number w; `None` where that is 0. The other numbers of the last row say nothing of a solid.
+fn matrix(value: &Value) -> Result<Option<[[f64; 4]; 4]>> {
     let wrong = |v: &Value, what: &str| (v.at, Problem::syntax(what, v.found()));
     let ValueKind::List(rows) = &value.kind else { return Err(wrong(value, "a 4×4 matrix")) };
     if rows.len() != 4 {
@@ -604,11 +604,11 @@ fn matrix(value: &Value) -> Result<[[f64; 4]; 4]> {
         }
     }
     let w = m[3][3];
-    if m[3][..3].iter().any(|x| x.abs() > SIMILARITY * w.abs()) || w == 0.0 {
-        return Err(wrong(&rows[3], "the row [0, 0, 0, 1]"));
+    if w == 0.0 {
+        return Ok(None);
     }
     if w != 1.0 {
         m.iter_mut().flatten().for_each(|x| *x /= w);
     }
-    Ok(m)
+    Ok(Some(m))
 }

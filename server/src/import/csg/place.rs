@@ -253,8 +253,28 @@ pub fn mesh(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<(Place
 
 /// The same of a mesh that may cross itself: what it winds around, and what was done to it.
 pub fn wound(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<(PlacedShape, Done), Problem> {
-    let (shape, done) = arrangement::mesh(closed(a, points, faces)?)?;
+    let (shape, done) = match arrangement::mesh(closed(a, points, faces)?) {
+        Ok(made) => made,
+        Err(fault) => where_it_stands(a, || closed(&DAffine3::IDENTITY, points, faces)).ok_or(fault)?,
+    };
     Ok((PlacedShape::new(shape, Pose::IDENTITY), done))
+}
+
+/// What a mesh winds around whose corners' roundings cross once they are moved: that of the mesh where it stands, moved. `None` where
+/// that has no solid either.
+fn where_it_stands(a: &DAffine3, closed: impl FnOnce() -> Result<Closed, MeshFault>) -> Option<(TriangleMesh, Done)> {
+    if *a == DAffine3::IDENTITY {
+        return None;
+    }
+    let (own, done) = arrangement::mesh(closed().ok()?).ok()?;
+    let points: Vec<DVec3> = own.vertices().iter().map(|p| a.transform_point3(*p)).collect();
+    let mirrored = a.matrix3.determinant() < 0.0;
+    let turned = |&[p, q, r]: &[u32; 3]| if mirrored { [p, r, q] } else { [p, q, r] };
+    let triangles: Vec<[u32; 3]> = own.triangles().iter().map(turned).collect();
+    let moved = TriangleMesh::closed(&points, triangles.iter().map(|t| &t[..])).ok()?;
+    // Roundings alone cross there: what was done is what was done before.
+    let (shape, _) = arrangement::mesh(moved).ok()?;
+    Some((shape, done))
 }
 
 /// The closed surface of faces clockwise from outside, its corners where the transform puts them.
@@ -265,14 +285,24 @@ fn closed(a: &DAffine3, points: &[DVec3], faces: &[Vec<u32>]) -> Result<Closed, 
     TriangleMesh::closed(&points, faces.iter().map(turned).collect::<Vec<_>>().iter().map(Vec::as_slice))
 }
 
+/// Triangles up to which a mesh whose roundings cross is tried once more.
+const AGAIN: usize = 200_000;
+
 /// What polygons wind around that run counter-clockwise as seen from outside, their corners where the transform puts them; and what
 /// was done to them.
 pub fn polygons(a: &DAffine3, polygons: Polygons) -> Result<(PlacedShape, Done), Problem> {
-    let polygons = polygons.placed(a);
-    let closed = TriangleMesh::closed(&polygons.points, polygons.faces())?;
     // Of many triangles they take as much as all the rest.
-    drop(polygons);
-    let (shape, done) = arrangement::mesh(closed)?;
+    let again = (polygons.triangles() <= AGAIN).then(|| polygons.clone());
+    let closed = {
+        let placed = polygons.placed(a);
+        TriangleMesh::closed(&placed.points, placed.faces())?
+    };
+    let (shape, done) = match arrangement::mesh(closed) {
+        Ok(made) => made,
+        Err(fault) => {
+            again.and_then(|own| where_it_stands(a, || TriangleMesh::closed(&own.points, own.faces()))).ok_or(fault)?
+        }
+    };
     Ok((PlacedShape::new(shape, Pose::IDENTITY), done))
 }
 
@@ -328,4 +358,28 @@ fn proper(orthogonal: DMat3) -> (DQuat, bool) {
     let m =
         if mirrored { DMat3::from_cols(-orthogonal.x_axis, orthogonal.y_axis, orthogonal.z_axis) } else { orthogonal };
     (DQuat::from_mat3(&m).normalize(), mirrored)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two cubes, one in a corner of the other, as one mesh: what is resolved where it stands and moved is what is moved and resolved.
+    #[test]
+    fn a_mesh_that_crosses_itself_is_the_same_moved_before_and_after() {
+        let corner = |i: u32, at: f64| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) + at;
+        let points: Vec<DVec3> = (0..16).map(|i| corner(i % 8, if i < 8 { 0.0 } else { 0.5 })).collect();
+        let faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
+        let faces: Vec<Vec<u32>> = [0, 8].iter().flat_map(|k| faces.map(|f| f.map(|i| i + k).to_vec())).collect();
+        let turned = DMat3::from_quat(DQuat::from_scaled_axis(DVec3::new(0.3, -0.4, 1.1)));
+        for linear in [turned, DMat3::from_diagonal(DVec3::new(-1.0, 2.0, 1.0)) * turned] {
+            let a = DAffine3::from_mat3_translation(linear, DVec3::new(3.0, 0.1, -7.0));
+            let (own, _) = where_it_stands(&a, || closed(&DAffine3::IDENTITY, &points, &faces)).expect("a solid");
+            let (moved, _) = wound(&a, &points, &faces).unwrap_or_else(|_| panic!("a solid"));
+            let volume = own.moments().expect("bounded").volume();
+            let Shape::TriangleMesh(moved) = &moved.shape else { panic!("a mesh") };
+            assert!((volume - moved.moments().expect("bounded").volume()).abs() < 1e-12);
+            assert!((volume - 1.875 * linear.determinant().abs()).abs() < 1e-12, "{volume}");
+        }
+    }
 }

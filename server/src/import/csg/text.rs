@@ -142,7 +142,10 @@ pub fn text(
         return Err((at, Problem::syntax("a font", format!("none for {:?}", pattern.family))));
     };
     let (family, style) = font.name();
-    if !pattern.is_met(&family) {
+    if pattern.is_style_alone() {
+        let text = format!("text in a font without a family: set in {family} {style}, OpenSCAD's may be another");
+        shapes.parts.note(at, text, None);
+    } else if !pattern.is_met(&family) {
         let text = format!("text in {:?}: that font is not at hand, set in {family} {style}", pattern.family);
         shapes.parts.note(at, text, None);
     }
@@ -372,6 +375,8 @@ mod tests {
                 .contains("text in \"Arial\": that font is not at hand, set in Ubuntu")
         );
         assert!(!told("\"a\", font = \"Hack\"").contains("at hand"));
+        assert!(told("\"a\", font = \":style=Bold\"").contains("text in a font without a family: set in Ubuntu"));
+        assert!(!told("\"a\", font = \"\"").contains("without a family"));
         assert!(told("\"a\u{10fff0}\"").contains("has no glyph for "));
         assert!(told("\"\"").contains("text without a visible character: left out"));
         assert!(told("\" \"").contains("text without a visible character: left out"));

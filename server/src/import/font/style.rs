@@ -48,6 +48,11 @@ impl Pattern {
         Self { written: written.to_owned(), family: family.to_owned(), style }
     }
 
+    /// True where it asks for a style of no family: which font that is in OpenSCAD, its system's settings say.
+    pub fn is_style_alone(&self) -> bool {
+        self.written.trim_start().starts_with(':')
+    }
+
     /// True where its characters are equally wide.
     pub fn is_mono(&self) -> bool {
         self.kind() == 2
