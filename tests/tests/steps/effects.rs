@@ -6,7 +6,7 @@ use contactd::contact::distance::{DistanceQuery, over_step, over_step_heeding};
 use contactd::contact::margin::{MARGIN_SLACK, apart_until};
 use contactd::contact::{QueryOptions, Scratch, Status, Verdict, earliest_contact};
 use contactd::ipc::{Embedded, ServerConfig};
-use contactd::math::halt::Halt;
+use contactd::math::halt::{Halt, heeding};
 use contactd::octree::Model;
 use contactd_client::{Error, Object, Session};
 use contactd_proto::contact_record::{
@@ -457,8 +457,11 @@ fn a_hit_is_told_only_once_the_start_is_free() {
 /// What comes after the end of a step's time takes no more work, and says no more than is proven.
 #[test]
 fn margins_and_distances_end_with_the_time_of_a_step() {
-    let halt = Arc::new(Halt::default());
-    halt.set();
+    let ended = || {
+        let halt = Arc::new(Halt::default());
+        halt.set();
+        halt
+    };
     let mut r = Random::new(517);
     let (mut whole, mut cut) = ([0; 2], [0; 2]);
     for _ in 0..8 {
@@ -468,18 +471,18 @@ fn margins_and_distances_end_with_the_time_of_a_step() {
         // Nearer than the octrees know, and farther.
         for part in [1e-3, 2.0] {
             let margin = part * a.radius.min(b.radius);
-            let cells = |scratch: &mut Scratch| {
-                let (until, _, work) = apart_until(&query, margin, scratch);
+            let cells = || {
+                let (until, _, work) = apart_until(&query, margin, &mut Scratch::default());
                 (until, work.cells + work.instant_cells)
             };
-            let (until, all) = cells(&mut Scratch::default());
-            let (early, few) = cells(&mut Scratch::heeding(Some(halt.clone())));
+            let (until, all) = cells();
+            let (early, few) = heeding(Some(&ended()), cells).expect("its own end");
             assert!(early <= until, "{early} and {until}");
             (whole[0], cut[0]) = (whole[0] + all, cut[0] + few);
         }
         let mut asked = DistanceQuery { a: query.a, b: query.b, tolerance: 1e-6, limit: 20_000 };
         asked.b.placed.motion.start.position += r.direction() * (2.0 * (a.radius + b.radius));
-        let (all, few) = (over_step(&asked), over_step_heeding(&asked, &halt));
+        let (all, few) = (over_step(&asked), over_step_heeding(&asked, &ended()));
         assert!(few.lower <= all.upper && all.lower <= few.upper, "{few:?} and {all:?}");
         (whole[1], cut[1]) = (whole[1] + all.cells, cut[1] + few.cells);
     }

@@ -7,6 +7,7 @@ mod by_hand;
 mod clearances;
 mod coherence;
 mod contact_cache;
+mod deadlines;
 mod dynamics;
 mod effect_costs;
 mod effects;

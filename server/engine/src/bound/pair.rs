@@ -13,7 +13,7 @@
 //! Not promised: time within the span; a long span is best cut by the caller.
 
 use super::{SBounds, Volumes};
-use crate::math::{Aabb, Ball, Oriented, tolerance::BOUND_PROGRESS};
+use crate::math::{Aabb, Ball, Oriented, halt, tolerance::BOUND_PROGRESS};
 use crate::motion::{Placed, Sweep};
 use crate::solid::{Node, NodeId, Op, Solid};
 use glam::DVec3;
@@ -105,6 +105,7 @@ fn settled<C: Clip>(
             if left.iter().any(C::is_empty) {
                 return None;
             }
+            halt::work(4 * sides[k].0.nodes.len());
             left[k] = left_in(sides[k].0, sides[k].1, &clip(k, &left[k], &left[1 - k]));
         }
         if left.iter().any(C::is_empty) {

@@ -183,7 +183,7 @@ pub fn apart_until(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (
     }
     let level = 0.5 * distance + 8.0 * task.rounding;
     if level > 0.99 * reach(&task) {
-        let work = Work::heeding(task.limit, scratch.halt.clone());
+        let work = Work::new(task.limit);
         let (until, known) = advance(&task, level, &work);
         return (until, known, Counters { instant_cells: work.cells(), ..Counters::default() });
     }
@@ -273,11 +273,11 @@ pub fn touching(query: &PairQuery, distance: f64, scratch: &mut Scratch) -> (Wit
     }
     task.limit = task.limit.min(region::MOST_CELLS);
     if level > 0.99 * reach(&task) {
-        let work = Work::heeding(task.limit, scratch.halt.clone());
+        let work = Work::new(task.limit);
         let within = within(&task, &task.relative.at(0.0), level, &work);
         return (within, work.cells());
     }
-    let work = Work::heeding(task.limit, scratch.halt.clone());
+    let work = Work::new(task.limit);
     // Of two convex primitives a point between the nearest, or a common one, mostly is as near as that.
     let between = || ConvexPair::between(task);
     if let Some(x) = glimpse(&task, &task.relative.at(0.0), level, between, &work) {

@@ -4,10 +4,13 @@
 //! Source: E. G. Gilbert, D. W. Johnson, S. S. Keerthi, IEEE J. Robotics and Automation 4(2), 1988; the nearest point of a
 //! simplex by its regions after C. Ericson, Real-Time Collision Detection, 5.1.
 
+use super::halt;
 use glam::{DMat3, DVec3};
 
 /// Points tried at most: curved bodies converge to this accuracy long before.
 const ROUNDS: usize = 48;
+/// What one of them costs, in looks at a face.
+const ROUND: usize = 8;
 /// Relative gap between the distance and its lower bound at which a direction is good enough to solve for a contact.
 pub const GOOD: f64 = 1e-6;
 
@@ -39,6 +42,7 @@ pub fn of_supports(a: impl Fn(DVec3) -> DVec3, b: impl Fn(DVec3) -> DVec3, start
     let mut count = 0;
     let mut v = start;
     for round in 0..ROUNDS {
+        halt::work(ROUND);
         let sa = a(v);
         let w = b(-v) - sa;
         let square = v.length_squared();
@@ -65,6 +69,7 @@ pub fn least_of(vectors: &[DVec3]) -> Option<DVec3> {
     let mut count = 0;
     let mut v = *vectors.first()?;
     for _ in 0..ROUNDS {
+        halt::work(vectors.len());
         let w = vectors.iter().copied().fold(v, |w, g| if g.dot(v) < w.dot(v) { g } else { w });
         if count > 0 && (v.dot(v) - v.dot(w) <= GOOD * v.dot(v) || simplex[..count].iter().any(|c| c.w == w)) {
             break;

@@ -25,6 +25,7 @@ pub use tables::{Meet, NodeKind, meet};
 pub use walk::{Candidates, Detail, Element, PairKind, SurfacePair, Walk};
 
 use crate::bound::{SBounds, Volumes};
+use crate::math::halt;
 use crate::math::tolerance::{MODEL_MARGIN, UNBOUNDED_MARGIN, WIDE_MARGIN};
 use crate::solid;
 use crate::solid::local::{LiteralId, Token, Truth};
@@ -135,7 +136,7 @@ impl Model {
         // On this thread alone: other searches may wait for them.
         let volumes = self.bounds.volumes();
         let margin = if self.radius.is_finite() { WIDE_MARGIN * self.radius } else { UNBOUNDED_MARGIN };
-        self.wide.get_or_init(|| SBounds::with_volumes(&self.solid, margin, volumes))
+        self.wide.get_or_init(|| halt::to_the_end(|| SBounds::with_volumes(&self.solid, margin, volumes)))
     }
 
     /// Depths and distances (lengths) up to which bounds and octree tell the truth about f.
@@ -228,6 +229,7 @@ impl Model {
         let mut most = usize::MAX;
         loop {
             let terms = node.terms().len();
+            halt::work(2);
             let children = match node.children() {
                 None if terms > MANY_TERMS && terms <= most => self.expand(node),
                 children => children,

@@ -181,7 +181,9 @@ impl Eco {
         if let Some(children) = node.children() {
             return Some(children);
         }
-        can_expand(bounds, node).then(|| &**node.children.get_or_init(|| children_of(solid, bounds, node)))
+        halt::work(EXPANSION * node.terms.len());
+        can_expand(bounds, node)
+            .then(|| &**node.children.get_or_init(|| halt::to_the_end(|| children_of(solid, bounds, node))))
     }
 
     /// The deepest node that holds `x` (model frame) among those built so far; `None` outside the root.
@@ -227,6 +229,9 @@ pub(super) fn cube_of(bounds: &SBounds) -> (DVec3, f64) {
         () => (DVec3::ZERO, f64::INFINITY),
     }
 }
+
+/// What a term of a node costs when its children are made, in looks at a face.
+const EXPANSION: usize = 16;
 
 fn can_expand(bounds: &SBounds, node: &Node) -> bool {
     matches!(node.kind, NodeKind::Grey | NodeKind::Mixed)

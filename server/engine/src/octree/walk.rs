@@ -19,6 +19,7 @@ use super::approach::Approach;
 use super::nodes::Node;
 use super::tables::{Meet, NodeKind, meet};
 use crate::bound::{CollisionRegion, Pruned};
+use crate::math::halt;
 use crate::motion::{Instant, Placed};
 use crate::solid::{Sense, Solid};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -162,6 +163,7 @@ impl<'m> Walk<'m> {
     /// The pair with its time, that of `at`, moved up to the earliest at which the two can meet; `None` when they cannot until
     /// `end`.
     pub fn timed(&self, pair: NodePair<'m>, at: &Instant, end: f64) -> Option<NodePair<'m>> {
+        halt::work(16);
         let (a, b) = (pair.a, pair.b);
         let outside = |p: &Pruned, n: &Node| !p.aabb.meets(&n.aabb().grown(self.margin));
         if a.kind() == NodeKind::Empty || b.kind() == NodeKind::Empty {

@@ -7,6 +7,7 @@
 
 use super::Sense;
 use super::local::{self, Expression, LiteralId, Span, Token, Truth};
+use crate::math::halt;
 use glam::DVec3;
 use std::borrow::Cow;
 use std::fmt;
@@ -172,6 +173,7 @@ fn write_division(
 }
 
 fn literal(face: u32, sense: Sense, out: &mut Vec<Token>, truth: &mut impl FnMut(LiteralId) -> Truth) -> Truth {
+    halt::work(2);
     let id = LiteralId::new(face, sense);
     let known = truth(id);
     if known == Truth::Open {
@@ -212,12 +214,16 @@ fn write_place(
 
 /// The value in a place, exact within the window; beyond it a bound on the same side. The nearer half comes first.
 fn value_in(division: &dyn Division, place: Place, psi: &mut impl FnMut(u32) -> f64, (low, high): (f64, f64)) -> f64 {
+    halt::work(2);
     match place {
         Place::Known(inside) => known(inside),
         Place::Part(part) => match division.part(part) {
             Part::Known(inside) => known(*inside),
             Part::Unclear => known(true),
-            Part::Open(tokens) => value(local::first(tokens).0, psi, (low, high)),
+            Part::Open(tokens) => {
+                halt::work(tokens.len() / 2);
+                value(local::first(tokens).0, psi, (low, high))
+            }
         },
         Place::Divided(n) => {
             let mut halves = division.halves(n).map(|(face, place)| (psi(face), place));
@@ -274,6 +280,7 @@ pub(super) fn open_parts(
     out: &mut Vec<Token>,
     open: &mut impl FnMut(LiteralId, &mut Vec<Token>) -> Truth,
 ) -> Truth {
+    halt::work(1);
     let (kind, body) = match local::first(tokens).0 {
         Expression::Literal(id) => {
             out.push(local::literal_token(id));

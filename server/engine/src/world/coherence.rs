@@ -298,6 +298,11 @@ impl PairCache {
         (self.via, self.prediction.as_deref())
     }
 
+    /// Forgets the last answer, and what was told beside it.
+    pub fn forget_answer(&mut self) {
+        (self.answered, self.is_in_hand, self.reported) = (false, false, None);
+    }
+
     /// Learns from a search that was allowed so much work.
     pub fn learn(&mut self, q: &Question, limit: u64, outcome: &Outcome) {
         self.via = Via::Search;

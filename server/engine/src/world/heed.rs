@@ -24,6 +24,18 @@ impl Heed {
         Self { halt: Arc::new(Halt::at(deadline)), leave: Arc::new(Halt::at(deadline)), crew }
     }
 
+    /// A step that ends when its work has looked so often whether it is to (`Halt::after`), on one thread.
+    pub fn after(looks: u64) -> Self {
+        let leave = Arc::new(Halt::default());
+        leave.set();
+        Self { halt: Arc::new(Halt::after(looks)), leave, crew: Arc::new(Crew::new(1)) }
+    }
+
+    /// Work that was done since the step was seen to be over (`math::halt`).
+    pub fn overrun(&self) -> u64 {
+        self.halt.overrun()
+    }
+
     /// For the next step, of the same session: another deadline, the same crew.
     pub fn next(&self, deadline: Option<Instant>) -> Arc<Self> {
         Arc::new(Self::new(deadline, self.crew.clone()))

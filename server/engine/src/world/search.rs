@@ -13,7 +13,7 @@ use super::heed::Heed;
 use super::options::StepOptions;
 use super::plan::PairPlan;
 use crate::contact::{self, Counters, Outcome, PairQuery, PairSearch, QueryOptions, Scratch, Status, Verdict};
-use crate::math::halt::Halt;
+use crate::math::halt::{self, Halt};
 use crate::math::tolerance;
 use crate::motion::Placed;
 use contactd_proto::{Detect, Motion, Report};
@@ -98,6 +98,13 @@ impl PairJob {
         }
         (found.clearance, found.known, found.apart) = (0.0, false, false);
         finish(&self.plan, &mut found.outcome);
+    }
+
+    /// What was told in a step whose time was up may be less than what there is to tell: it answers no other question.
+    fn forget_answer(&mut self) {
+        if let Some(pair_cache) = &mut self.pair_cache {
+            pair_cache.forget_answer();
+        }
     }
 }
 
@@ -250,23 +257,30 @@ impl Searches<'_> {
             return;
         }
         let q = job.question(self.bodies, self.options, self.clock);
-        let cells = memory.with(|thread_scratch| {
-            thread_scratch.scratch.halt = halt.cloned();
-            let mut counters = Counters::default();
-            let pair_cache = job.pair_cache.as_mut().filter(|_| !job.is_blank);
-            if let Some(finding) = pair_cache.and_then(|k| k.ask(&q, &mut thread_scratch.scratch, &mut counters)) {
-                job.found = finding;
-                finish(&job.plan, &mut job.found.outcome);
-                thread_scratch.count(&job.found.outcome.counters);
-                job.is_done = true;
-                return 0;
-            }
-            job.found.known = false;
-            if self.first {
-                job.is_done = true;
-                return 0;
-            }
-            self.search(job, q, counters, halt, thread_scratch)
+        let told = halt::heeding(halt, || {
+            memory.with(|thread_scratch| {
+                let mut counters = Counters::default();
+                let pair_cache = job.pair_cache.as_mut().filter(|_| !job.is_blank);
+                if let Some(finding) = pair_cache.and_then(|k| k.ask(&q, &mut thread_scratch.scratch, &mut counters)) {
+                    job.found = finding;
+                    finish(&job.plan, &mut job.found.outcome);
+                    thread_scratch.count(&job.found.outcome.counters);
+                    job.is_done = true;
+                    return 0;
+                }
+                job.found.known = false;
+                if self.first {
+                    job.is_done = true;
+                    return 0;
+                }
+                self.search(job, q, counters, thread_scratch)
+            })
+        });
+        let cells = told.unwrap_or_else(|| {
+            // Nothing is known of it: it is searched elsewhere, or undecided at last.
+            job.found.outcome = Outcome::clear(job.resolution);
+            (job.found.clearance, job.found.known, job.found.apart) = (0.0, false, false);
+            0
         });
         if self.spent.fetch_add(cells, Relaxed) + cells > self.most {
             self.beyond.store(true, Relaxed);
@@ -274,20 +288,13 @@ impl Searches<'_> {
     }
 
     /// Searches a pair; `asked` is what it has cost to ask what is known. Returns the cells that count for the batch.
-    fn search(
-        &self,
-        job: &mut PairJob,
-        mut q: Question,
-        asked: Counters,
-        halt: Option<&Arc<Halt>>,
-        thread_scratch: &mut ThreadScratch,
-    ) -> u64 {
+    fn search(&self, job: &mut PairJob, mut q: Question, asked: Counters, thread_scratch: &mut ThreadScratch) -> u64 {
         let cut = q.query.cell_limit > self.most;
         q.query.cell_limit = q.query.cell_limit.min(self.most);
         // Outcomes are large: it is written where it is to be.
         let outcome = &mut job.found.outcome;
         contact::find_earliest(&q.query, &mut thread_scratch.scratch, outcome);
-        if outcome.status() == Status::Undecided && halt.is_some_and(|halt| halt.is_set()) {
+        if halt::is_up() {
             if !self.is_over() {
                 // Cut short, perhaps, to be searched elsewhere: it counts for nothing.
                 job.found.outcome = Outcome::clear(job.resolution);
@@ -295,6 +302,7 @@ impl Searches<'_> {
             }
             outcome.counters += asked;
             job.take(&q, q.query.cell_limit);
+            job.forget_answer();
             job.is_done = true;
             return 0;
         }
@@ -333,8 +341,7 @@ fn run_queue(
         q.query.cell_limit = q.query.cell_limit.min(batch_limit(options));
     }
     let halt = heed.map(|heed| &heed.halt);
-    let scratch = || Scratch::heeding(halt.cloned());
-    let searches = questions.iter().map(|q| PairSearch::new(&q.query, scratch()));
+    let searches = questions.iter().map(|q| PairSearch::new(&q.query, Scratch::default()));
     let mut searches: Vec<PairSearch> = searches.collect();
     // All times are >= 0, so their bits order as they do; ties go to the smaller pair.
     let mut queue: BinaryHeap<Reverse<(u64, usize)>> = (0..open.len()).map(|i| Reverse((0, i))).collect();
@@ -354,19 +361,33 @@ fn run_queue(
         let next = queue.peek().map_or(f64::INFINITY, |Reverse((next, _))| f64::from_bits(*next));
         let before = search.spent();
         let allowed = before.saturating_add(left);
-        let ended = search.run_within(next.max(time).min(horizon), left);
+        let until = next.max(time).min(horizon);
+        let undecided = undecided(search, time);
+        // Where there is no time left nothing is proven but what the queue says.
+        let ended = halt::heeding(halt, || (search.run_within(until, left), halt::is_up()));
+        let (ended, is_up) = ended.unwrap_or((Some(undecided), true));
         left = left.saturating_sub(search.spent() - before);
         match ended {
             None => queue.push(Reverse((search.earliest().max(time).to_bits(), i))),
             Some(outcome) => {
                 open[i].found.outcome = outcome;
                 open[i].take(&questions[i], questions[i].query.cell_limit.min(allowed));
+                if is_up {
+                    open[i].forget_answer();
+                }
                 if first && !open[i].plan.sensor && outcome.meets() {
                     horizon = horizon.min(open[i].found.outcome.time_upper() + tolerance::FIRST_SLACK);
                 }
             }
         }
     }
+}
+
+/// The answer of a search that is not run on, where nothing is met before `time`.
+fn undecided(search: &PairSearch, time: f64) -> Outcome {
+    let verdict = Verdict::Undecided { time_lower: time.min(1.0) };
+    let (resolution, depth, past) = (search.resolution(), search.depth(), search.is_past());
+    Outcome { verdict, resolution, depth, past, counters: search.counters(), ..Outcome::clear(resolution) }
 }
 
 /// Cells' worth of work that all pairs of a step together may cost by default: two pairs at their own limit.

@@ -178,7 +178,6 @@ impl World {
         let Self { roster, state, .. } = self;
         let bodies = &roster.bodies;
         search::run(bodies, &mut state.jobs, options, state.clock, &mut state.searches, heed);
-        state.scratch.halt = heed.map(|heed| heed.halt.clone());
         state.outcome.clear();
         let out = &mut state.outcome;
         (out.searched, out.known) = (state.glanced, state.glanced);
@@ -208,15 +207,16 @@ fn decide(roster: &Roster, state: &mut StepState, options: &StepOptions, left: &
         let plan = jobs[0].plan;
         let discrete = plan.detect == Detect::Discrete;
         for (i, job) in (before..).zip(jobs.iter_mut()) {
-            if heed.is_some_and(Heed::is_over) {
+            let is_over = heed.is_some_and(Heed::is_over);
+            if is_over {
                 *left = 0;
             }
             let effects = &mut out.effect_counters;
-            if job.found.outcome.status() == Status::Undecided {
+            if job.found.outcome.status() == Status::Undecided && !is_over {
                 sieve.sees_apart(job, options);
             }
-            let complete =
-                touch::decide(bodies, job, options, left, effects, scratch) || sieve.sees_apart(job, options);
+            let complete = touch::decide(bodies, job, options, left, effects, (scratch, heed))
+                || !is_over && sieve.sees_apart(job, options);
             count_effects(job, bodies, effects);
             let outcome = &job.found.outcome;
             out.counters += outcome.counters;
@@ -246,9 +246,13 @@ fn decide(roster: &Roster, state: &mut StepState, options: &StepOptions, left: &
 /// Writes the told pairs in their order, as many as are asked for.
 fn report(state: &mut StepState, options: &StepOptions) {
     let StepState { jobs, outcome: out, reported, .. } = state;
-    // Outcomes are large: their keys are sorted, and each is moved once.
+    // Outcomes are large: their keys are sorted, and each that is told is moved once. Which are the scene's first they tell themselves.
     reported.sort_unstable();
-    out.pairs.extend(reported.iter().map(|&(_, a, b, i, regions_complete)| {
+    let most = if options.max_records == 0 { usize::MAX } else { options.max_records as usize };
+    let told = if options.first { &reported[..] } else { &reported[..reported.len().min(most)] };
+    out.truncated = told.len() < reported.len();
+    let beyond = reported[told.len()..].iter().filter(|told| jobs[told.3 as usize].plan.sensor).count();
+    out.pairs.extend(told.iter().map(|&(_, a, b, i, regions_complete)| {
         let PairJob { plan, found, resolution, .. } = &jobs[i as usize];
         let (outcome, coarser) = (found.outcome, found.outcome.resolution > *resolution);
         let (regions, patch_slots) = ((0, 0), (0, 0));
@@ -258,9 +262,9 @@ fn report(state: &mut StepState, options: &StepOptions) {
     if options.first {
         keep_first(&mut out.pairs);
     }
-    out.effect_counters.sensors = out.pairs.iter().filter(|p| p.plan.sensor).count() as u64;
-    if options.max_records > 0 && out.pairs.len() > options.max_records as usize {
-        out.pairs.truncate(options.max_records as usize);
+    out.effect_counters.sensors = (beyond + out.pairs.iter().filter(|p| p.plan.sensor).count()) as u64;
+    if out.pairs.len() > most {
+        out.pairs.truncate(most);
         out.truncated = true;
     }
 }

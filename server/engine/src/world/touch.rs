@@ -16,7 +16,8 @@ use crate::contact::distance::{self, DistanceQuery};
 use crate::contact::margin;
 use crate::contact::pair::overlap;
 use crate::contact::within::Within;
-use crate::contact::{Outcome, PairQuery, Scratch, Status, region};
+use crate::contact::{Counters, Outcome, PairQuery, Scratch, Status, region};
+use crate::math::halt;
 use contactd_proto::{Detect, EffectCounters, Report};
 
 /// True when regions are told of a pair. A step that asks for its first contact has no use for clear pairs.
@@ -41,7 +42,7 @@ pub(super) fn decide(
     options: &StepOptions,
     left: &mut u64,
     effects: &mut EffectCounters,
-    scratch: &mut Scratch,
+    (scratch, heed): (&mut Scratch, Option<&Heed>),
 ) -> bool {
     // The flag stands beside every pair whose time is told, whether regions are asked or not; clear pairs are told where
     // their rule or the step asks for them.
@@ -74,11 +75,13 @@ pub(super) fn decide(
         return true;
     }
     effects.margins += u64::from(margin);
+    let halt = heed.map(|heed| &heed.halt);
     let threshold = region::threshold(resolution, job.plan.margin);
     let (within, cells) = if job.found.outcome.apart > threshold + resolution {
         (Within::Apart, 0)
     } else {
-        margin::touching(&query(bodies, job, options, *left), threshold, scratch)
+        let query = query(bodies, job, options, *left);
+        halt::heeding(halt, || margin::touching(&query, threshold, scratch)).unwrap_or((Within::Open, 0))
     };
     let outcome = &mut job.found.outcome;
     outcome.touching = within != Within::Apart;
@@ -90,7 +93,8 @@ pub(super) fn decide(
     if margin && within == Within::Apart && clear && job.plan.detect != Detect::Discrete {
         let mut query = query(bodies, job, options, *left);
         query.cell_limit = query.cell_limit.min(region::MOST_CELLS);
-        let (until, known, work) = margin::apart_until(&query, threshold, scratch);
+        let told = halt::heeding(halt, || margin::apart_until(&query, threshold, scratch));
+        let (until, known, work) = told.unwrap_or((0.0, false, Counters::default()));
         let cells = work.cells + work.instant_cells;
         let outcome = &mut job.found.outcome;
         outcome.margin_time = until;
@@ -134,10 +138,11 @@ pub(super) fn measure(
         let query = DistanceQuery { a, b, tolerance: p.plan.clearance, limit };
         let pair = (bodies[job.a as usize].id, bodies[job.b as usize].id);
         let found = known.recall(pair, &query).unwrap_or_else(|| {
-            let found = match heed {
-                Some(heed) => distance::over_step_heeding(&query, &heed.halt),
-                None => distance::over_step(&query),
+            let found = match heed.map(|heed| &heed.halt) {
+                Some(halt) => halt::heeding(Some(halt), || distance::over_step_heeding(&query, halt)),
+                None => Some(distance::over_step(&query)),
             };
+            let found = found.unwrap_or_else(distance::unknown);
             out.effect_counters.clearances += 1;
             out.counters.instant_cells += found.cells;
             found
@@ -176,10 +181,11 @@ pub(super) fn find_regions(
             let query = query(bodies, job, options, left);
             let threshold = region::threshold(p.outcome.resolution, job.plan.margin);
             // The surfaces of bodies in each other cut. They are told where the bodies come apart, as far as their depth is asked for.
-            let found = match p.outcome.penetration() {
+            let told = halt::heeding(heed.map(|heed| &heed.halt), || match p.outcome.penetration() {
                 Some(penetration) => overlap::regions(&query, penetration, threshold, scratch),
                 None => region::complete(&query, &mut p.outcome, threshold),
-            };
+            });
+            let found = told.unwrap_or_else(|| region::cut_short(&p.outcome));
             let looked = match p.outcome.status() {
                 Status::Contact => true,
                 Status::Clear => p.outcome.touching,

@@ -94,6 +94,12 @@ pub fn over_step_heeding(query: &DistanceQuery, halt: &Halt) -> Distance {
     between(query, 0.0, 1.0, Some(halt))
 }
 
+/// What is known of a least distance that there was no time to look for.
+pub fn unknown() -> Distance {
+    let [a, b] = [NearPoint::NONE; 2];
+    Distance { lower: 0.0, upper: f64::INFINITY, time: 0.0, a, b, is_settled: false, rounding: 0.0, cells: 0 }
+}
+
 /// The least distance between two times of the motion.
 fn between(query: &DistanceQuery, from: f64, to: f64, halt: Option<&Halt>) -> Distance {
     let (a, b) = (without_own_spin(&query.a), without_own_spin(&query.b));

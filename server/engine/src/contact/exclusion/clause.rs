@@ -17,12 +17,15 @@ use super::course::Course;
 use super::fit::{self, Fitted, Touchable, fit, spun};
 use super::literal::{Linear, Side, View};
 use super::lp::{self, Planes, Solution};
+use crate::math::halt;
 use crate::solid::Sense;
 use crate::solid::alike::{Ball, above};
 use crate::solid::local::{LiteralId, Token};
 use glam::DVec3;
 use smallvec::SmallVec;
 
+/// What a literal that is added costs, in looks at a face.
+const ADDED: usize = 16;
 /// Weight of a concave literal's own cost in the choice of the axis to split, whether it holds the bound or not.
 const IDLE_COST: f64 = 0.25;
 /// The same of a convex one that curves.
@@ -287,6 +290,7 @@ impl Run<'_, '_> {
 
     /// Adds a literal's bound, with the tangents and fits it brings along.
     pub fn add(&mut self, side: Side, id: LiteralId, at: u32, list: Lists) {
+        halt::work(ADDED);
         // What stands twice in a clause brings along nothing new. (Hulls have thousands of literals, mostly in order.)
         let mut last = self.scratch.taken.last().map_or([None; 2], |t| t.last);
         let own = &mut last[usize::from(side == Side::B)];
@@ -585,6 +589,7 @@ impl Run<'_, '_> {
     /// The linear program with bounds looked ahead to `look`, and what its multipliers give through time.
     fn solve(&mut self, look: f64) -> Solved {
         let s = &mut *self.scratch;
+        halt::work(4 * s.lits.len());
         s.planes.set(s.lits.iter().map(|l| (l.normal_ahead(look), l.ahead(look))));
         s.evaluations += s.lits.len() as u64;
         let solution = if self.view.multipliers {

@@ -18,6 +18,7 @@ use super::clause::{
 use super::literal::{Linear, Side, View};
 use super::lp;
 use super::tighten::Left;
+use crate::math::halt;
 use crate::solid::local::{self, Expression};
 use glam::DVec3;
 use smallvec::SmallVec;
@@ -83,6 +84,7 @@ pub fn left(view: &View, pair: &Expressions, rounding: f64, worth: f64, scratch:
 fn begin<'a, 'p>(run: Run<'a, 'p>) -> Run<'a, 'p> {
     let mut run = run;
     let pair = run.pair;
+    halt::work((pair.a.1 - pair.a.0 + pair.b.1 - pair.b.0) as usize);
     let scratch = &mut *run.scratch;
     scratch.lits.clear();
     scratch.notes.clear();

@@ -9,6 +9,7 @@
 //! needs no first phase. Whatever it returns is only a proposal: callers evaluate the bound of its λ themselves, so an
 //! early stop or rounding can cost work, never correctness.
 
+use crate::math::halt;
 use glam::{DMat4, DVec3, DVec4};
 
 /// The multipliers and the point the program proposes.
@@ -141,6 +142,7 @@ pub fn min_max(planes: &mut Planes, half: DVec3, warm: &mut Warm) -> Solution {
     let mut y = [0.0; 4];
     let mut pivots = 0;
     for _ in 0..MAX_PIVOTS {
+        halt::work(8);
         pivots += 1;
         for k in 0..4 {
             y[k] = p[0] * inv[0][k] + p[1] * inv[1][k] + p[2] * inv[2][k] + p[3] * inv[3][k];

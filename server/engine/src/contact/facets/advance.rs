@@ -20,12 +20,15 @@ use crate::contact::witness::contacts::{Contacts, Guess};
 use crate::contact::witness::found::Ending;
 use crate::contact::witness::known::Known;
 use crate::math::gjk::GOOD;
+use crate::math::halt;
 use glam::DVec3;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 /// Pairs of places that are looked at before a pair is left to the search.
 const MOST: u64 = 400_000;
+/// What a pair costs, in looks at a face.
+const ITEM: usize = 64;
 /// Advances of one pair of facets.
 const ROUNDS: u8 = 48;
 /// Moments that are kept.
@@ -148,9 +151,10 @@ impl<'s, 'a> Advance<'s, 'a> {
                 break;
             }
             count += 1;
+            halt::work(ITEM);
             let is_leaf = (0..2).all(|k| self.bodies[k].is_leaf(item.places[k]));
             let step = match () {
-                () if count > MOST => Step::Stuck,
+                () if count > MOST || halt::is_up() => Step::Stuck,
                 () if is_leaf => self.advance(contacts, item),
                 () => {
                     self.divide(&item);

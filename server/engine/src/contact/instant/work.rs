@@ -2,11 +2,10 @@
 //!
 //! What is done with one instant of a pair (whether it touches, its regions, its deepest point) is counted as the search
 //! is: in cells. A box that is bounded is a cell; a look at one face is a part of one. When the cells run out the work
-//! ends, and what was found until then is told as incomplete.
+//! ends, and what was found until then is told as incomplete. So it is when the time of the step is up.
 
-use crate::math::halt::Halt;
+use crate::math::halt;
 use std::cell::Cell;
-use std::sync::Arc;
 
 /// Looks at a face that cost as much as bounding one cell.
 const LOOKS_PER_CELL: u64 = 64;
@@ -16,22 +15,17 @@ const LOOKS_PER_CELL: u64 = 64;
 pub struct Work {
     limit: u64,
     looks: Cell<u64>,
-    halt: Option<Arc<Halt>>,
 }
 
 impl Work {
     /// Work of at most `cells`.
     pub fn new(cells: u64) -> Self {
-        Self::heeding(cells, None)
-    }
-
-    /// Work of at most `cells`, that ends where `halt` says so as if they were spent.
-    pub fn heeding(cells: u64, halt: Option<Arc<Halt>>) -> Self {
-        Self { limit: cells.saturating_mul(LOOKS_PER_CELL), looks: Cell::new(0), halt }
+        Self { limit: cells.saturating_mul(LOOKS_PER_CELL), looks: Cell::new(0) }
     }
 
     /// Counts looks at faces.
     pub fn look(&self, faces: usize) {
+        halt::work(faces);
         self.looks.set(self.looks.get() + faces as u64);
     }
 
@@ -42,7 +36,7 @@ impl Work {
 
     /// True when no more may be done.
     pub fn is_spent(&self) -> bool {
-        self.looks.get() >= self.limit || self.halt.as_ref().is_some_and(|halt| halt.is_over())
+        self.looks.get() >= self.limit || halt::is_up()
     }
 
     /// Cells' worth of work done.

@@ -23,6 +23,7 @@ use crate::contact::witness::known::Known;
 use crate::contact::witness::newton::Solution;
 use crate::contact::witness::retreat::{BACK, Climber};
 use crate::contact::witness::touch::Touch;
+use crate::math::halt;
 use crate::motion::Placed;
 use glam::DVec3;
 
@@ -269,7 +270,8 @@ impl<'a> PairSearch<'a> {
     /// How far the kernels come; `along` separates the bodies at the start.
     fn begun(&self, along: Option<DVec3>, mut scratch: Scratch) -> State<'a> {
         let mut contacts = Contacts::new(self.task);
-        let from = match front::kernels(&mut contacts, along, &mut scratch) {
+        let told = halt::attempt(|| front::kernels(&mut contacts, along, &mut scratch));
+        let from = match told.unwrap_or(Front::Ended(Ending::Limit(0.0))) {
             Front::Ended(ending) => return State::Ended(Some(ending), contacts.counters, scratch),
             Front::Free(until) => until,
             Front::Open => 0.0,
@@ -298,7 +300,9 @@ impl<'a> PairSearch<'a> {
         if task.query_options.penetration {
             let at = task.relative.at(0.0);
             let work = Work::new(task.limit.min(depth::MOST_CELLS));
-            let (deepest, direction, depth, _) = depth::deepest(task, &at, x, &work);
+            let Some((deepest, direction, depth, _)) = halt::attempt(|| depth::deepest(task, &at, x, &work)) else {
+                return outcome;
+            };
             let sign = if self.swapped { -1.0 } else { 1.0 };
             let penetration = Penetration {
                 depth: 2.0 * depth,
@@ -380,11 +384,28 @@ impl<'a> PairSearch<'a> {
         }
         loop {
             let (ending, cells) = self.ending(until)?;
-            let answer = self.answer(ending, cells);
+            let open = self.open_at(ending.proven());
+            let answer = halt::attempt(|| self.answer(ending, cells)).unwrap_or_else(|| Some(self.unwound(&open)));
             if answer.is_some() {
                 return answer;
             }
         }
+    }
+
+    /// What is proven where a search has found nothing before `t`, or what a finer one has.
+    fn open_at(&self, t: f64) -> Open {
+        let (resolution, depth, free_until) = match &self.open {
+            Some(open) => (open.resolution, open.depth, open.free_until),
+            None => (self.resolution, self.task.delta, t),
+        };
+        Open { resolution, depth, free_until, found: None }
+    }
+
+    /// The answer where the time of the step was up before an ending was told.
+    fn unwound(&mut self, open: &Open) -> Outcome {
+        self.open = None;
+        self.outcome.verdict = Verdict::Undecided { time_lower: open.free_until };
+        Outcome { resolution: open.resolution, depth: open.depth, ..self.outcome }
     }
 
     /// How the search ends, and the cells' worth of work that it took; `None` where it comes to `until` first.
@@ -651,10 +672,12 @@ impl<'a> PairSearch<'a> {
         self.task.limit = self.task.limit.saturating_sub(cells);
         let mut contacts = Contacts::new(self.task);
         let again = self.coarser > 0 && self.task.strategies.cavities;
-        let mut ending = if again { cavity::answer(&mut contacts) } else { None };
-        if ending.is_none() && self.task.strategies.balls {
-            ending = ball::answer(&mut contacts);
-        }
+        let balls = self.task.strategies.balls;
+        let told = halt::attempt(|| {
+            let ending = if again { cavity::answer(&mut contacts) } else { None };
+            ending.or_else(|| if balls { ball::answer(&mut contacts) } else { None })
+        });
+        let ending = told.unwrap_or(Some(Ending::Limit(0.0)));
         let scratch = self.take_scratch();
         if ending.is_some() {
             self.state = State::Ended(ending, contacts.counters, scratch);

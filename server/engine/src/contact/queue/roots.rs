@@ -9,9 +9,10 @@
 //! inside {f <= g} and be taken for its interior, where no first contact is.
 
 use crate::bound::{Bound, Volumes};
-use crate::math::Aabb;
+use crate::math::{Aabb, halt};
 use crate::solid::local::{self, Expression, Token};
 use crate::solid::{Sense, Solid};
+use std::cell::Cell;
 
 /// One alternative and the box that holds it (the solid's frame).
 #[derive(Clone, Debug)]
@@ -26,7 +27,7 @@ pub struct Root {
 /// most about `most` of them.
 pub fn alternatives(solid: &Solid, tokens: &[Token], region: &Aabb, level: f64, most: usize) -> Vec<Root> {
     let mut out = Vec::new();
-    split(&Grown { solid, level, most }, tokens, region, &mut out);
+    split(&Grown { solid, level, most, last: Cell::new(None) }, tokens, region, &mut out);
     out
 }
 
@@ -35,6 +36,20 @@ struct Grown<'s> {
     solid: &'s Solid,
     level: f64,
     most: usize,
+    /// The primitive that was asked for last, and its box: most literals of a large mesh stand beside each other.
+    last: Cell<Option<(u32, Aabb)>>,
+}
+
+impl Grown<'_> {
+    fn box_of(&self, primitive: u32) -> Aabb {
+        if let Some((_, aabb)) = self.last.get().filter(|last| last.0 == primitive) {
+            return aabb;
+        }
+        let p = &self.solid.primitives[primitive as usize];
+        let aabb = if self.level > 0.0 { Bound::of_primitive(p, self.level, Volumes::Both).aabb } else { p.aabb };
+        self.last.set(Some((primitive, aabb)));
+        aabb
+    }
 }
 
 fn split(of: &Grown, tokens: &[Token], region: &Aabb, out: &mut Vec<Root>) {
@@ -96,11 +111,10 @@ fn each<'t>(mut body: &'t [Token], mut f: impl FnMut(&'t [Token])) {
 /// A box that holds an expression's points with f <= level: a positive literal lies in its whole primitive, whose other faces
 /// stand beside it or hold throughout the region.
 fn bound(of: &Grown, tokens: &[Token]) -> Aabb {
+    halt::work(4);
     match local::first(tokens).0 {
         Expression::Literal(id) | Expression::Part(id) if id.sense() == Sense::Positive => {
-            let Some(p) = of.solid.face_owner.get(id.face() as usize) else { return Aabb::ALL };
-            let p = &of.solid.primitives[*p as usize];
-            if of.level > 0.0 { Bound::of_primitive(p, of.level, Volumes::Both).aabb } else { p.aabb }
+            of.solid.face_owner.get(id.face() as usize).map_or(Aabb::ALL, |p| of.box_of(*p))
         }
         Expression::Literal(_) | Expression::Part(_) => Aabb::ALL,
         Expression::And(body) => {

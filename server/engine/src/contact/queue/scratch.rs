@@ -4,11 +4,9 @@ use super::cell::Cell;
 use super::clock::{Clock, Stage};
 use crate::contact::exclusion::clause;
 use crate::contact::exclusion::literal::Side;
-use crate::math::halt::Halt;
 use crate::solid::Face;
 use crate::solid::local::{LiteralId, Token};
 use std::collections::BinaryHeap;
-use std::sync::Arc;
 
 /// Memory of a search, kept from one to the next.
 #[derive(Default, Debug)]
@@ -20,19 +18,12 @@ pub struct Scratch {
     /// Guesses that were followed: of which literals, from how small a cell, and whether to their ends.
     pub(super) tried: Vec<(Vec<(Side, LiteralId)>, i32, bool)>,
     clock: Option<Clock>,
-    /// Ends searches like their limit, from outside.
-    pub halt: Option<Arc<Halt>>,
 }
 
 impl Scratch {
     /// With a clock: `take_clock` tells afterwards where the time went.
     pub fn timed() -> Self {
         Self { clock: Some(Clock::default()), ..Self::default() }
-    }
-
-    /// Memory whose searches end from outside.
-    pub fn heeding(halt: Option<Arc<Halt>>) -> Self {
-        Self { halt, ..Self::default() }
     }
 
     /// What the clock says, which starts anew.

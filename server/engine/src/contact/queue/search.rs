@@ -37,6 +37,7 @@ use crate::contact::witness::contacts::{Contacts, Visited};
 use crate::contact::witness::found::Ending;
 use crate::contact::witness::known::Known;
 use crate::contact::witness::newton::Constraint;
+use crate::math::halt;
 use crate::motion::{Bounds, Instant};
 use crate::solid::Solid;
 use crate::solid::local::{self, LiteralId, Truth};
@@ -70,8 +71,6 @@ const SHARP: f64 = 0.05;
 
 /// Of so many cells at a thin wall one looks for a witness by another way.
 const DEEPEN_EVERY: u64 = 1000;
-/// Cells for each look at the clock, where there is a deadline.
-const CELLS_PER_LOOK: u64 = 16;
 
 /// A point this many roundings short of delta can be neither excluded nor confirmed by much.
 const NEARLY: f64 = 8.0;
@@ -131,6 +130,8 @@ pub struct Search<'a> {
     pub(in crate::contact) patience: u64,
     /// Where the search came to its end without an answer: time and place.
     stuck: Option<(f64, DVec3)>,
+    /// Nothing happens before, as far as the item in hand shows.
+    proven: f64,
     /// Faces that were asked where they are deepest in each other at the start.
     balanced: SmallVec<[BalancedLits; 2]>,
     /// The faces of a contact that comes at once were asked so, too.
@@ -149,6 +150,7 @@ impl<'a> Search<'a> {
             probe: FIRST_PROBE,
             patience: u64::MAX,
             stuck: None,
+            proven: 0.0,
             balanced: SmallVec::new(),
             asked_soon: false,
         }
@@ -184,13 +186,22 @@ impl<'a> Search<'a> {
         self.items.earliest()
     }
 
-    /// Runs to the end, or until nothing before `until` is left: then `None`.
+    /// Runs to the end, or until nothing before `until` is left: then `None`. Where the time of the step ends amid an item, nothing is
+    /// proven but what was before it.
     pub fn run(&mut self, until: f64) -> Option<Ending> {
         self.items.scratch.enter(Stage::Cells);
+        halt::attempt(|| self.pop_until(until)).unwrap_or_else(|| {
+            let is_proven = self.proven >= self.contacts.goal();
+            Some(if is_proven { self.contacts.end() } else { Ending::Limit(self.proven) })
+        })
+    }
+
+    fn pop_until(&mut self, until: f64) -> Option<Ending> {
         loop {
             let Some(cell) = self.items.scratch.heap.peek().copied() else {
                 return Some(self.contacts.end());
             };
+            self.proven = cell.t.min(self.contacts.goal());
             if cell.t >= self.contacts.goal() {
                 // Proven. What lies just behind may touch earlier all the same: a few cells are asked once more.
                 let asks = cell.source == Source::Cell && cell.t < self.contacts.horizon() && self.rivals < MAX_RIVALS;
@@ -214,7 +225,7 @@ impl<'a> Search<'a> {
             if cell.source == Source::Cell
                 && (self.contacts.counters.spent(self.contacts.task.asked_limit) >= self.contacts.task.limit
                     || self.contacts.counters.evaluations >= self.contacts.task.most_evaluations
-                    || self.is_halted())
+                    || halt::is_up())
             {
                 return Some(Ending::Limit(cell.t));
             }
@@ -249,12 +260,6 @@ impl<'a> Search<'a> {
             return None;
         }
         self.contacts.end_from(proven)
-    }
-
-    /// True once the search is to end from outside. The clock is looked at once for some cells.
-    fn is_halted(&self) -> bool {
-        let looks = self.contacts.counters.cells.is_multiple_of(CELLS_PER_LOOK);
-        self.items.scratch.halt.as_ref().is_some_and(|halt| if looks { halt.is_over() } else { halt.is_set() })
     }
 
     /// Refines one cell. A point deeper than delta in both bodies at t = 0 ends the search, and so does one that rounding

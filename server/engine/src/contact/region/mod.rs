@@ -38,6 +38,7 @@ use crate::contact::instant::work::Work;
 use crate::contact::query::outcome::{ContactKind, ContactPoint, Extent, NO_FACE, Outcome, Verdict};
 use crate::contact::query::question::PairQuery;
 use crate::contact::query::task::Task;
+use crate::math::halt;
 use crate::motion::relative::Instant;
 use glam::DVec3;
 use line::Candidate;
@@ -217,7 +218,7 @@ pub fn complete(query: &PairQuery, outcome: &mut Outcome, threshold: f64) -> Reg
     let touching = outcome.touching;
     let found = match &mut outcome.verdict {
         Verdict::Contact(contact) => {
-            let mut found = regions(query, contact.time, threshold);
+            let mut found = halt::attempt(|| regions(query, contact.time, threshold)).unwrap_or_default();
             if let (Some(p), true) = (&contact.point, found.regions.is_empty()) {
                 // A contact that its own faces cannot be followed to: the point is what is known.
                 found.regions.push(Region::of_point(p));
@@ -226,7 +227,7 @@ pub fn complete(query: &PairQuery, outcome: &mut Outcome, threshold: f64) -> Reg
             found
         }
         Verdict::Clear { rest, .. } if touching => {
-            let found = regions(query, 0.0, threshold);
+            let found = halt::attempt(|| regions(query, 0.0, threshold)).unwrap_or_default();
             let nearest = found.regions.iter().min_by(|r, s| r.separation().total_cmp(&s.separation()));
             *rest = nearest.map(|r| r.at_rest(query));
             found
@@ -237,6 +238,12 @@ pub fn complete(query: &PairQuery, outcome: &mut Outcome, threshold: f64) -> Reg
     };
     outcome.counters.instant_cells += found.cells;
     found
+}
+
+/// The regions of an answered question that there is no time to look for: the contact's point, where one is known.
+pub fn cut_short(outcome: &Outcome) -> Regions {
+    let of_contact = outcome.contact().and_then(|contact| contact.point.as_ref());
+    Regions { regions: of_contact.map(Region::of_point).into_iter().collect(), ..Regions::default() }
 }
 
 impl Region {

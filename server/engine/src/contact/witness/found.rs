@@ -71,3 +71,15 @@ pub enum Ending {
     /// known, if any, comes much later.
     Long(f64, Option<Found>),
 }
+
+impl Ending {
+    /// Nothing is met before, fraction of the step.
+    pub(in crate::contact) fn proven(&self) -> f64 {
+        match self {
+            Ending::Clear => 1.0,
+            Ending::Contact(found) => found.goal.clamp(0.0, 1.0),
+            Ending::Deep(_) => 0.0,
+            Ending::Rounding(t) | Ending::Limit(t) | Ending::Long(t, _) => *t,
+        }
+    }
+}

@@ -16,6 +16,7 @@
 
 use crate::contact::exclusion::literal::{Faces, Side};
 use crate::contact::query::task::Task;
+use crate::math::halt;
 use crate::motion::{Instant, Relative};
 use crate::solid::local::LiteralId;
 use crate::solid::surface::{Apex, Curvature, FaceAt};
@@ -27,6 +28,8 @@ use smallvec::SmallVec;
 const FARTHEST: f64 = 4.0;
 /// Way, in scales, that hardly is one.
 const HARDLY: f64 = 1e-6;
+/// What a row of a system costs, in looks at a face.
+const ROW: usize = 4;
 /// Steps in which a slow pair passes its scale.
 const SLOW: f64 = 1e3;
 /// |Σ λ g| below which multipliers have settled.
@@ -462,6 +465,7 @@ impl Problem<'_> {
         let m = active.len();
         let mut last = f64::INFINITY;
         for _ in 0..12 {
+            halt::work(ROW * active.len());
             let at = self.relative.at(t);
             let (mut g, mut v, mut residual) = ([[0.0; 4]; MAX_ACTIVE], [0.0; MAX_ACTIVE], 0.0f64);
             for (i, c) in active.iter().enumerate() {
@@ -505,6 +509,7 @@ impl Problem<'_> {
         (f, jac): (&mut [f64; MAX_UNKNOWNS], &mut [[f64; MAX_UNKNOWNS]; MAX_UNKNOWNS]),
     ) -> f64 {
         let m = active.len();
+        halt::work(ROW * m);
         let at = self.relative.at(t);
         let (mut sum, mut curvature, mut sum_rate, mut total, mut literals) =
             (DVec3::ZERO, DMat3::ZERO, DVec3::ZERO, 0.0, false);

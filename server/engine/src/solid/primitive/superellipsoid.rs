@@ -1,6 +1,7 @@
 //! Superellipsoid around the origin.
 
 use super::{Checked, Convex, Cuboid, Geometry, Shape, Sink, Source, read_vector, write_vector};
+use crate::math::halt;
 use crate::math::{Aabb, Ball, Moments};
 use crate::solid::Face;
 use crate::solid::surface;
@@ -33,6 +34,7 @@ impl Superellipsoid {
 
     /// The point of the surface at Barr's angles: north of the equator and east, in radians.
     fn at(&self, north: f64, east: f64) -> DVec3 {
+        halt::work(16);
         let ([s, c], [t, d]) = ([libm::sin(north), libm::cos(north)], [libm::sin(east), libm::cos(east)]);
         let power = |x: f64, e: f64| libm::pow(x.abs(), e).copysign(x);
         let [e, f] = self.exponents.to_array();

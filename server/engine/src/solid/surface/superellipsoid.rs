@@ -31,6 +31,7 @@ use super::{
     Axis, Bend, Curvature, FaceAt, Law, NUMBERS, Section, Stretches, Surface, Symmetry, largest_corner, tangent,
 };
 use crate::math::any_perpendicular;
+use crate::math::halt;
 use glam::{DMat3, DVec2, DVec3};
 
 /// Least and largest exponent.
@@ -76,6 +77,8 @@ impl Joined {
         if large == 0.0 {
             return Self { length: 0.0, parts: [1.0, 0.0], weights: [1.0, 0.0] };
         }
+        // Two powers take as long as many a face.
+        halt::work(8);
         let t = small / large;
         let power = libm::pow(t, p);
         let whole = 1.0 + power;

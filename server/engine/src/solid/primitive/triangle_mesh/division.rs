@@ -23,7 +23,7 @@ use super::local::Expr;
 use super::outward;
 use super::side::crosses;
 use super::surface::Surface;
-use crate::math::Aabb;
+use crate::math::{Aabb, halt};
 use crate::solid::faces::Planes;
 use crate::solid::formula::{Division, Part, Place};
 use crate::solid::local::Span;
@@ -32,6 +32,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::sync::{Arc, OnceLock};
+
+/// What a facet of a part costs where that is written out, in looks at a face.
+const FACET: usize = 64;
 
 /// Part of a cell's size below which a box is small beside it: only then the formula of a part is asked for bounds.
 const SMALL: f64 = 0.25;
@@ -302,6 +305,10 @@ impl Division for Divided {
 
     fn part(&self, part: u32) -> &Part {
         let n = (part - self.first_part()) as usize;
+        if self.made.0[n].get().is_none() {
+            let leaf = &self.leaves[n];
+            halt::work(FACET * (leaf.to - leaf.from) as usize);
+        }
         self.made.0[n].get_or_init(|| {
             let leaf = self.leaves[n];
             let cell = self.cell(leaf.parent);
