@@ -5,4 +5,5 @@ mod by_hand;
 mod closed;
 mod convex;
 mod forms;
+mod meshes;
 mod moving;

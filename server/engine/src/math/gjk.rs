@@ -23,12 +23,15 @@ struct Corner {
 
 /// How two convex sets stand to each other that are told by their supports.
 pub enum Cores {
-    /// The shortest vector from one to the other, and the point of a where it begins.
+    /// The shortest vector from one to the other, and the points between which it is, but for rounding. Along flat sides that face each
+    /// other that may lead elsewhere in b than to the point of a and this vector.
     Apart {
         /// From a to b.
         v: DVec3,
         /// The point of a.
         a: DVec3,
+        /// The point of b.
+        b: DVec3,
     },
     /// A point of both, as far as rounding goes.
     Common(DVec3),
@@ -60,7 +63,8 @@ pub fn of_supports(a: impl Fn(DVec3) -> DVec3, b: impl Fn(DVec3) -> DVec3, start
         }
         v = next;
     }
-    Cores::Apart { v, a: simplex[..count].iter().map(|c| c.a * c.weight).sum() }
+    let [a, b] = [0.0, 1.0].map(|k| simplex[..count].iter().map(|c| (c.a + c.w * k) * c.weight).sum());
+    Cores::Apart { v, a, b }
 }
 
 /// The shortest convex combination of some vectors; `None` if it is 0, or there are none.

@@ -59,7 +59,7 @@ pub fn nearest(a: &impl SupportMapping, b: &impl SupportMapping, start: DVec3, g
 /// lower bound; or a common point.
 pub fn meeting(a: &impl SupportMapping, b: &impl SupportMapping, start: DVec3, good: f64) -> Meeting {
     match of_supports(|v| a.support(v), |v| b.support(v), start, good) {
-        Cores::Apart { v, a: on_a } => {
+        Cores::Apart { v, a: on_a, .. } => {
             let length = v.length();
             let normal = v / length;
             if !normal.is_finite() {

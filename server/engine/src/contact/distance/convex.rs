@@ -7,7 +7,7 @@
 //! right part of the way to a point that is deep.
 
 use super::active_set::Clause;
-use super::polish::{FEATURE, Pair, Polish, Side, Steps};
+use super::polish::{FEATURE, Held, Pair, Polish, Side, Steps};
 use super::{Distance, LEAST, NearPoint, common, slack};
 use crate::contact::query::outcome::NO_FACE;
 use crate::math::gjk::{Cores, GOOD, of_supports};
@@ -21,7 +21,7 @@ use glam::{DMat3, DVec3};
 /// Relative gap to which the nearest points of bodies with corners are found, and those that Newton's method does not prove.
 const EXACT: f64 = 1e-15;
 /// From what GJK leaves to steps whose square is rounding: the bounds tell whether they came to the nearest points.
-const STEPS: Steps = Steps { met: 16.0 * GOOD, last: 1e-8, most: 12, longest: 0.02 };
+pub const STEPS: Steps = Steps { met: 16.0 * GOOD, last: 1e-8, most: 12, longest: 0.02 };
 /// A point this near to an apex is the apex, in the pair's size: GJK finds it at once where it is nearest, and Newton's method never.
 const TIP: f64 = 1e-9;
 /// Bounds this near to each other, in rounding's lengths, are of the nearest points: those are moved inwards by a few.
@@ -29,14 +29,14 @@ const PROVEN: f64 = 32.0;
 /// The last of the directions from which GJK starts.
 const LAST: usize = 3;
 /// Faces this near to a point, in the pair's size, are those among which it is moved.
-const NEAR: f64 = 0.05;
+pub const NEAR: f64 = 0.05;
 
 /// Two bodies that are one convex primitive each.
 #[derive(Clone, Copy, Debug)]
 pub struct ConvexPair<'a>([&'a Primitive; 2]);
 
 /// A convex primitive in A's frame.
-struct Body<'a> {
+pub struct Body<'a> {
     primitive: &'a Primitive,
     shape: Convex<'a>,
     axes: DMat3,
@@ -84,6 +84,14 @@ impl<'a> ConvexPair<'a> {
     }
 }
 
+impl<'a> Body<'a> {
+    /// One where it stands in its own model.
+    pub fn of(primitive: &'a Primitive) -> Self {
+        let (axes, origin) = (primitive.frame.matrix(), primitive.frame.position);
+        Self { primitive, shape: primitive.shape.convex(), axes, origin }
+    }
+}
+
 impl Body<'_> {
     /// Largest u·x; u is a unit vector.
     fn reach(&self, u: DVec3) -> f64 {
@@ -94,7 +102,13 @@ impl Body<'_> {
         self.shape.support(&self.axes, self.origin, u)
     }
 
-    fn middle(&self) -> DVec3 {
+    /// True where GJK finds nearest points in finitely many steps.
+    pub fn has_corners_alone(&self) -> bool {
+        self.shape.has_corners_alone()
+    }
+
+    /// A point inside a bounded one.
+    pub fn middle(&self) -> DVec3 {
         self.origin + self.axes * self.shape.middle()
     }
 }
@@ -130,7 +144,7 @@ impl Placed<'_> {
                 let start = start.unwrap_or(b.middle() - a.middle());
                 let start = if start == DVec3::ZERO { DVec3::X } else { start };
                 match of_supports(|v| a.support(v), |v| b.support(v), start, good) {
-                    Cores::Apart { v, a } => (a, v),
+                    Cores::Apart { v, a, .. } => (a, v),
                     Cores::Common(x) => return Some(Found::Common(x)),
                     Cores::Open => return None,
                 }
@@ -274,8 +288,8 @@ impl Placed<'_> {
         };
         let held = match [is_tip(0, start.0), is_tip(1, start.1)] {
             [true, true] => return None,
-            [true, false] => Some(0),
-            [false, true] => Some(1),
+            [true, false] => Some(Held::still(0)),
+            [false, true] => Some(Held::still(1)),
             [false, false] => None,
         };
         let led = Polish { sides, at, scale, rounding, steps: STEPS }.solve(&clauses, start, held);
@@ -285,12 +299,12 @@ impl Placed<'_> {
 
 impl Body<'_> {
     /// f at a point of the model's frame.
-    fn value(&self, x: DVec3) -> f64 {
+    pub fn value(&self, x: DVec3) -> f64 {
         self.primitive.highest(x).1
     }
 
     /// The literals near a point of the model's frame: of few faces all.
-    fn clause(&self, x: DVec3, near: f64) -> Clause {
+    pub fn clause(&self, x: DVec3, near: f64) -> Clause {
         let first = self.primitive.first_face;
         let literal = |face: u32| LiteralId::new(first + face, Sense::Positive);
         match self.primitive.not_below(x, -near) {
@@ -300,7 +314,7 @@ impl Body<'_> {
     }
 
     /// A point next to one at the surface, of the model's frame, proven inside; `inwards` is a unit vector that may lead there.
-    fn inside(&self, x: DVec3, inwards: DVec3, rounding: f64) -> Option<DVec3> {
+    pub fn inside(&self, x: DVec3, inwards: DVec3, rounding: f64) -> Option<DVec3> {
         let is_inside = |x: &DVec3| self.value(*x) <= -rounding;
         let near = x + inwards * (2.0 * rounding);
         if is_inside(&near) {
@@ -319,7 +333,7 @@ impl Body<'_> {
     }
 
     /// The faces at a point of the model's frame, at most three, by face id; `NO_FACE` fills.
-    fn faces(&self, x: DVec3, scale: f64, rounding: f64) -> [u32; 3] {
+    pub fn faces(&self, x: DVec3, scale: f64, rounding: f64) -> [u32; 3] {
         let reach = FEATURE * scale + 1e3 * rounding;
         let mut nearest = [(reach, NO_FACE); 3];
         let mut take = |face: u32| {

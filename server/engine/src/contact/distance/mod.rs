@@ -10,6 +10,7 @@
 pub(in crate::contact) mod active_set;
 mod common;
 mod convex;
+mod facets;
 pub(in crate::contact) mod part;
 pub(in crate::contact) mod polish;
 pub(in crate::contact) mod polytope;
@@ -124,7 +125,11 @@ fn between(query: &DistanceQuery, from: f64, to: f64, halt: Option<&Halt>) -> Di
     {
         return answer;
     }
-    search::Search::new(query, [relative, Relative::new(b, a)], rounding, halt).run(from, to)
+    let both = [relative, Relative::new(b, a)];
+    if let Some(answer) = facets::Search::new(query, &both, rounding, halt).and_then(|search| search.run(from, to)) {
+        return answer;
+    }
+    search::Search::new(query, both, rounding, halt).run(from, to)
 }
 
 /// What rounding may take from a bound, a length: of faces and poses, of hulls and supports.

@@ -8,11 +8,12 @@ use super::active_set::{ActiveSet, Clause, MOST_MET, REGULAR, clause};
 use super::part::literal_at;
 use crate::contact::query::outcome::NO_FACE;
 use crate::contact::witness::newton::hessian;
+use crate::math::Aabb;
 use crate::math::gjk::least_of;
 use crate::math::linear::eliminated;
 use crate::motion::Instant;
 use crate::octree::Model;
-use crate::solid::local::{LiteralId, Token};
+use crate::solid::local::{LiteralId, Token, Truth};
 use crate::solid::{Face, Sense};
 use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
@@ -21,6 +22,12 @@ use smallvec::SmallVec;
 const CHOICES: usize = 3;
 /// Literals this near to 0, relative to the size, count as met at first.
 const MET: f64 = 1e-7;
+/// What of a large mesh matters to a point that is looked for lies within this many times its f.
+const AROUND: f64 = 2.0;
+/// Steps down along f at most, how much farther than to the face that decides they lead, and places from where they begin.
+const DESCENT: usize = 64;
+const BEYOND: f64 = 1.5;
+const STARTS: usize = 8;
 /// Faces of a body that are looked through for others at a point.
 const MOST_FACES: usize = 256;
 /// Literals this near to 0, relative to the size, are told as the features of a point.
@@ -73,23 +80,76 @@ pub struct Steps {
     pub longest: f64,
 }
 
+/// What of a point is fixed while the other one moves: it goes along some directions alone, A's axes, or nowhere.
+#[derive(Clone, Copy, Debug)]
+pub struct Held<'s> {
+    /// Whose point.
+    pub side: usize,
+    /// Where it may go: unit vectors, square to each other.
+    pub along: &'s [DVec3],
+}
+
+impl Held<'_> {
+    /// A point that stays.
+    pub fn still(side: usize) -> Self {
+        Self { side, along: &[] }
+    }
+}
+
 impl Steps {
     /// From where hulls of parts come nearest to what is hardly more than rounding.
     pub const ALL: Self = Self { met: MET, last: 1e-14, most: 40, longest: 0.25 };
 }
 
 impl Polish<'_, '_> {
+    /// The *and* of literals that a body is around a point. Where a mesh's part stands in the way, of what of it matters near the point: in
+    /// a box that holds some of its surface, or of its inside, if its f tells how far that is.
     fn clause(&self, side: usize, x: DVec3) -> Option<Clause> {
         let Side { model, tokens } = self.sides[side];
-        clause(tokens, &mut |f| model.solid.faces[f as usize].value(x))
+        let mut psi = |f: u32| model.solid.faces[f as usize].value(x);
+        if let Some(known) = clause(tokens, &mut psi) {
+            return Some(known);
+        }
+        let reach = DVec3::splat(AROUND * (model.value(x).abs() + MET * self.scale));
+        let (region, mut near) = (Aabb { min: x - reach, max: x + reach }, Vec::new());
+        match model.solid.prune_to_box(tokens, &region, (0.0, self.rounding), &mut near) {
+            Truth::Open => clause(&near, &mut psi),
+            Truth::True => Some(Clause::new()),
+            Truth::False => None,
+        }
     }
 
     fn at(&self, side: usize, id: LiteralId, x: DVec3) -> (f64, DVec3) {
         literal_at(&self.sides[side].model.solid.faces[id.face() as usize], id.sense(), x)
     }
 
-    /// The points of both bodies, verified, to which x (A's frame) and y (B's) lead; `None` where they lead to none.
-    pub fn run(&self, mut x: DVec3, mut y: DVec3) -> Option<Pair> {
+    /// The points of both bodies, verified, to which x (A's frame) and y (B's) lead; `None` where they lead to none. What of a large mesh
+    /// is around a point that is far from its surface is too much to be looked at: then from where f leads down to.
+    pub fn run(&self, x: DVec3, y: DVec3) -> Option<Pair> {
+        let below = || {
+            let has_parts = self.sides.iter().any(|side| side.model.solid.has_parts);
+            has_parts.then(|| Some((self.descended(0, x)?, self.descended(1, y)?))).flatten()
+        };
+        self.run_from(x, y).or_else(|| below().and_then(|(x, y)| self.run_from(x, y)))
+    }
+
+    /// Down along f from a point, or else from what is inside of a primitive: somewhere in the body, if that leads there.
+    fn descended(&self, side: usize, x: DVec3) -> Option<DVec3> {
+        let model = self.sides[side].model;
+        let inside = model.solid.primitives.iter().map(|p| p.frame.point(p.shape.geometry().interior_point()));
+        std::iter::once(x).chain(inside).take(STARTS).find_map(|mut x| {
+            for _ in 0..DESCENT {
+                let (f, id) = model.deciding(x);
+                if f <= -self.rounding {
+                    return Some(x);
+                }
+                x -= self.at(side, id, x).1 * (BEYOND * f.max(0.0) + 4.0 * self.rounding);
+            }
+            None
+        })
+    }
+
+    fn run_from(&self, mut x: DVec3, mut y: DVec3) -> Option<Pair> {
         let mut best = self.verified(x, y);
         let mut keep = |found: Option<Pair>| {
             if let Some(found) = found
@@ -106,13 +166,15 @@ impl Polish<'_, '_> {
         for held in [0, 1] {
             for tip in &tips[held] {
                 let start = if held == 0 { (*tip, y) } else { (x, *tip) };
-                let clauses = [self.clause(0, start.0)?, self.clause(1, start.1)?];
-                let (p, q, _) = self.solve(&clauses, start, Some(held));
+                let (Some(a), Some(b)) = (self.clause(0, start.0), self.clause(1, start.1)) else { continue };
+                let clauses = [a, b];
+                let (p, q, _) = self.solve(&clauses, start, Some(Held::still(held)));
                 keep(self.verified(p, q));
             }
         }
         for _ in 0..CHOICES {
-            let clauses = [self.clause(0, x)?, self.clause(1, y)?];
+            let (Some(a), Some(b)) = (self.clause(0, x), self.clause(1, y)) else { break };
+            let clauses = [a, b];
             (x, y, _) = self.solve(&clauses, (x, y), None);
             if !(x.is_finite() && y.is_finite()) || keep(self.verified(x, y)) {
                 break;
@@ -180,17 +242,18 @@ impl Polish<'_, '_> {
         [2.0, 8.0, 64.0].into_iter().map(|k| x + inwards * (k * self.rounding)).find(|x| is_inside(*x))
     }
 
-    /// Newton's steps of both points, each in its body's frame, or of the one that is not held, among the literals of each body; and
-    /// whether they have come to an end.
+    /// Newton's steps of both points, each in its body's frame, among the literals of each body that is not held; and whether they have
+    /// come to an end.
     pub fn solve(
         &self,
         clauses: &[Clause; 2],
         (mut x, mut y): (DVec3, DVec3),
-        held: Option<usize>,
+        held: Option<Held>,
     ) -> (DVec3, DVec3, bool) {
+        let free = |side: usize| held.is_none_or(|held| held.side != side);
         let mut met: [ActiveSet; 2] = Default::default();
         let (near, tiny) = (self.steps.met * self.scale, 4.0 * self.rounding);
-        for (side, p) in [(0, x), (1, y)].into_iter().filter(|(side, _)| Some(*side) != held) {
+        for (side, p) in [(0, x), (1, y)].into_iter().filter(|(side, _)| free(*side)) {
             met[side] = ActiveSet::new(&clauses[side], near, |id| self.at(side, id, p).0);
         }
         for _ in 0..self.steps.most {
@@ -204,7 +267,7 @@ impl Polish<'_, '_> {
             let damp = if length > most { most / length } else { 1.0 };
             (x, y) = (x + p * damp, y + q * damp);
             let mut changed = false;
-            for (side, at) in [(0, x), (1, y)].into_iter().filter(|(side, _)| Some(*side) != held) {
+            for (side, at) in [(0, x), (1, y)].into_iter().filter(|(side, _)| free(*side)) {
                 changed |= met[side].enter(&clauses[side], tiny, |id| self.at(side, id, at).0);
             }
             if !changed && length <= self.steps.last * self.scale {
@@ -216,7 +279,7 @@ impl Polish<'_, '_> {
 
     /// One step of both points, each in its frame: of the distance and what the weighted literals bend, among the ways that leave the
     /// literals met (the null-space method; J. Nocedal, S. Wright, Numerical Optimization, 2nd ed., 16.2).
-    fn step(&self, met: &[ActiveSet; 2], (x, y): (DVec3, DVec3), held: Option<usize>) -> Option<(DVec3, DVec3)> {
+    fn step(&self, met: &[ActiveSet; 2], (x, y): (DVec3, DVec3), held: Option<Held>) -> Option<(DVec3, DVec3)> {
         let mut bent = [DMat3::IDENTITY * (1.0 + REGULAR); 2];
         let mut ways: [Ways; 2] = Default::default();
         for side in [0, 1] {
@@ -237,9 +300,10 @@ impl Polish<'_, '_> {
                 literals.iter_mut().for_each(|l| l.0 = self.at.a_vector(l.0));
             }
             bent[side] += bend;
-            if held != Some(side) {
-                ways[side] = Ways::of(&literals);
-            }
+            ways[side] = match held {
+                Some(held) if held.side == side => Ways { first: DVec3::ZERO, along: held.along.into() },
+                _ => Ways::of(&literals),
+            };
         }
         let apart = x - self.at.a_point(y);
         let [a, b] = &ways;
@@ -282,8 +346,7 @@ impl Polish<'_, '_> {
     }
 }
 
-/// The ways from a point to where some literals are met, to first order: one of them, and what else leaves them met. None of a point
-/// that is held.
+/// The ways from a point to where some literals are met, to first order: one of them, and what else leaves them met.
 #[derive(Default)]
 struct Ways {
     first: DVec3,

@@ -4,7 +4,7 @@ use super::convex::{ConvexPair, NearestPair};
 use super::part::{Cut, Part, Parts, literal_at};
 use super::polish::{Pair, Polish, Side, Steps};
 use super::polytope::support;
-use super::span::{Span, Stray};
+use super::span::{Span, Stray, least_above_chord};
 use super::{Distance, DistanceQuery, LEAST, NearPoint, common, slack};
 use crate::math::gjk::{Cores, of_supports};
 use crate::math::halt::Halt;
@@ -217,7 +217,7 @@ impl<'a> Search<'a> {
         let start = if middle == DVec3::ZERO { DVec3::X } else { middle };
         let seen = |v: DVec3| at.a_point(hull_b.support(at.b_from_a * v));
         match of_supports(|v| hull_a.support(v), seen, start, EXACT) {
-            Cores::Apart { v, a } => ((a, a + v), v),
+            Cores::Apart { v, a, .. } => ((a, a + v), v),
             // A flat simplex may tell any point.
             Cores::Common(x) if hull_a.aabb().contains(x) => ((x, x), DVec3::ZERO),
             Cores::Common(_) | Cores::Open => {
@@ -479,10 +479,7 @@ impl<'a> Search<'a> {
         let moved = (a.motion.velocity - b.motion.velocity).length() + spins[0] * reaches[0] + spins[1] * reaches[1];
         let pull = spins[0] * spins[0] * reaches[0] + spins[1] * spins[1] * reaches[1];
         let dip = (2.0 * rate * h * moved + pull * h * h) * (1.0 + 1e-12);
-        // The least of p + (q - p) s - dip s (1 - s) / 2.
-        let rise = q.lower - p.lower;
-        let s = if dip > 0.0 { (0.5 - rise / dip).clamp(0.0, 1.0) } else { 0.0 };
-        (p.lower + rise * s - 0.5 * dip * s * (1.0 - s)).min(p.lower).min(q.lower) - self.slack
+        least_above_chord([p.lower, q.lower], dip) - self.slack
     }
 
     /// Takes the tangents of convex faces at the points where two hulls are nearest. False where nothing changes.

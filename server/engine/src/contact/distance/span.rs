@@ -28,6 +28,15 @@ pub struct Stray {
     pub middle: f64,
 }
 
+/// How points of a body move in a span, seen from the other one.
+#[derive(Clone, Copy, Debug)]
+pub struct Pace {
+    /// V h: no point goes farther, a length.
+    pub way: f64,
+    /// Acc h²: no place has a larger second derivative by the part of the span that has passed, a length.
+    pub bend: f64,
+}
+
 impl Span {
     /// A span of the motion of a against b.
     pub fn new(relative: &Relative, from: f64, to: f64) -> Self {
@@ -42,15 +51,28 @@ impl Span {
 
     /// How the points of a box of the mover's model frame stray; `relative` is the mover against the observer.
     pub fn stray(&self, relative: &Relative, aabb: &Aabb) -> Stray {
+        let far = ((aabb.center() - relative.center_a()).abs() + aabb.half()).length();
+        let Pace { way, bend } = self.pace(relative, far);
+        let middle = 0.5 * way;
+        Stray { chord: middle.min(0.125 * bend), middle }
+    }
+
+    /// How points within `far` (a length) of the mover's centre of rotation move in the span; `relative` is the mover against the observer.
+    pub fn pace(&self, relative: &Relative, far: f64) -> Pace {
         let h = self.length();
         if h <= 0.0 {
-            return Stray { chord: 0.0, middle: 0.0 };
+            return Pace { way: 0.0, bend: 0.0 };
         }
-        let far = ((aabb.center() - relative.center_a()).abs() + aabb.half()).length();
         let b = relative.bounds(self.from, h, far);
         let observer_spin = relative.placed().1.motion.spin.length();
         let pull = (b.omega * b.omega + b.cross) * b.x_max + observer_spin * b.swing + b.bend;
-        let middle = 0.5 * (b.speed + b.slip) * h;
-        Stray { chord: middle.min(0.125 * pull * h * h) * (1.0 + 1e-12), middle: middle * (1.0 + 1e-12) }
+        Pace { way: (b.speed + b.slip) * h * (1.0 + 1e-12), bend: pull * h * h * (1.0 + 1e-12) }
     }
+}
+
+/// The least of a function on [0, 1] that lies no deeper than `dip` s(1 − s)/2 below the chord between its values at the ends.
+pub fn least_above_chord([from, to]: [f64; 2], dip: f64) -> f64 {
+    let rise = to - from;
+    let s = if dip > 0.0 { (0.5 - rise / dip).clamp(0.0, 1.0) } else { 0.0 };
+    (from + rise * s - 0.5 * dip * s * (1.0 - s)).min(from).min(to)
 }

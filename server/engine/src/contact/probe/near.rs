@@ -258,7 +258,7 @@ impl<'a> Search<'a> {
         let between = x - points[0];
         let start = if between == DVec3::ZERO { DVec3::X } else { between };
         match of_supports(|v| support(points, v), |_| x, start, EXACT) {
-            Cores::Apart { v, a } => v.try_normalize().map(|u| (a, u)),
+            Cores::Apart { v, a, .. } => v.try_normalize().map(|u| (a, u)),
             Cores::Common(_) | Cores::Open => None,
         }
     }

@@ -202,7 +202,7 @@ fn normal(bodies: &Bodies, pair: &Polytopes) -> Option<(DVec3, SmallVec<[DVec3; 
         for _ in 0..STARTS {
             bodies.work.look(pair.a.corners.len() + pair.b.corners.len());
             let cores = of_supports(|n| pair.a.support(n), |n| pair.b.support(n), way, GOOD);
-            let Cores::Apart { v, a } = cores else { break };
+            let Cores::Apart { v, a, .. } = cores else { break };
             if v.length() <= APART * bodies.size {
                 break;
             }
