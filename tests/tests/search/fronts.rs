@@ -47,7 +47,7 @@ fn edged(r: &mut Random, ball: Recipe) -> Scene {
 }
 
 /// A ball, about its centre or not, against any tree: from outside, or within a hollow of any shape. It may turn, and so may the tree.
-fn ball(r: &mut Random) -> Scene {
+pub(super) fn ball(r: &mut Random) -> Scene {
     let ball = Recipe::sphere(r.within(0.05, 0.3));
     let ball = if r.chance(0.7) { ball } else { ball.moved(&Pose::at(r.vector(0.1))) };
     if r.chance(0.5) {

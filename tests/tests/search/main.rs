@@ -2,6 +2,7 @@
 //! One program for all of them links once; `--test search NAME::` runs those of one file.
 #![allow(missing_docs)]
 
+mod ball_feet;
 mod bounds;
 mod cavities;
 mod certificate;

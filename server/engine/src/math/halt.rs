@@ -132,7 +132,8 @@ fn look(amount: u64) {
             halt.overrun.fetch_add(LOOK + amount, Relaxed);
         }
         IS_UP.set(halt.is_over());
-        let is_spent = IS_UP.get() && halt.is_spent();
+        // A program that aborts where it would unwind waits for what does not end by itself.
+        let is_spent = cfg!(panic = "unwind") && IS_UP.get() && halt.is_spent();
         // Whatever is still done after that is unwound at its first step.
         LEFT.set(if is_spent { 0 } else { LOOK });
         is_spent

@@ -176,6 +176,15 @@ impl Solid {
         }
     }
 
+    /// The centre and the radius of a solid that is a ball, in its own frame, and its face.
+    pub fn as_ball(&self) -> Option<(DVec3, f64, LiteralId)> {
+        // Its number is not 0 where the tree once had more than is left of it.
+        let whole = self.whole()?;
+        let [face] = whole.faces.listed() else { return None };
+        let (center, radius) = face.ball()?;
+        Some((center, radius, LiteralId::new(whole.first_face, Sense::Positive)))
+    }
+
     /// A solid of primitives in file order and of nodes, children before their parents; each primitive stands at one leaf and
     /// each node below one other. The rest follows from them.
     pub(crate) fn of_parts(primitives: Vec<Primitive>, nodes: Vec<Node>, root: NodeId) -> Self {

@@ -75,15 +75,6 @@ pub(super) fn within(task: &Task, level: f64) -> Option<Within> {
     (separation::value(task, &at, x) <= level).then_some(Within::Witness(x))
 }
 
-/// The centre and the radius of a solid that is a ball, in its own frame, and its face.
-fn ball(solid: &Solid) -> Option<(DVec3, f64, LiteralId)> {
-    // Its number is not 0 where the tree once had more than is left of it.
-    let whole = solid.whole()?;
-    let [face] = whole.faces.listed() else { return None };
-    let (center, radius) = face.ball()?;
-    Some((center, radius, LiteralId::new(whole.first_face, Sense::Positive)))
-}
-
 /// A ball that moves against a solid.
 struct Advance<'t, 'a> {
     task: &'t Task<'a>,
@@ -106,7 +97,7 @@ struct Advance<'t, 'a> {
 impl<'t, 'a> Advance<'t, 'a> {
     /// `None` for other pairs, and where rounding is not far below the depth that is asked for.
     fn of(task: &'t Task<'a>) -> Option<Self> {
-        let of = |side, solid, other| ball(solid).map(|ball| (side, ball, other));
+        let of = |side, solid: &Solid, other| solid.as_ball().map(|ball| (side, ball, other));
         let (side, (center, radius, face), other): (_, _, &Model) =
             of(Side::A, task.a, task.model_b).or_else(|| of(Side::B, task.b, task.model_a))?;
         if other.solid.faces.len() > MOST_FACES || other.solid.has_parts {

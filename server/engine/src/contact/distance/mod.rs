@@ -126,10 +126,17 @@ fn between(query: &DistanceQuery, from: f64, to: f64, halt: Option<&Halt>) -> Di
         return answer;
     }
     let both = [relative, Relative::new(b, a)];
-    if let Some(answer) = facets::Search::new(query, &both, rounding, halt).and_then(|search| search.run(from, to)) {
+    let Some(mut front) = facets::Search::new(query, &both, rounding, halt) else {
+        return search::Search::new(query, both, rounding, halt).run(from, to);
+    };
+    if let Some(answer) = front.run(from, to) {
         return answer;
     }
-    search::Search::new(query, both, rounding, halt).run(from, to)
+    // What it has cost and proven counts.
+    let (cells, lower) = front.left();
+    let rest = DistanceQuery { limit: query.limit.saturating_sub(cells), ..*query };
+    let found = search::Search::new(&rest, both, rounding, halt).run(from, to);
+    Distance { lower: found.lower.max(lower.min(found.upper)), cells: found.cells + cells, ..found }
 }
 
 /// What rounding may take from a bound, a length: of faces and poses, of hulls and supports.

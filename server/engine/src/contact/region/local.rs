@@ -300,7 +300,7 @@ impl<'t, 'a> Bodies<'t, 'a> {
 
 /// The sign with which a literal takes its face's psi.
 #[inline]
-fn sign(lit: Lit) -> f64 {
+pub fn sign(lit: Lit) -> f64 {
     if lit.1.sense() == Sense::Positive { 1.0 } else { -1.0 }
 }
 

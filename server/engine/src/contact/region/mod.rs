@@ -20,6 +20,7 @@
 //! circular, comes as points; isolated points closer to each other than 1/24 of the smaller body's radius may come as one; and
 //! rulings or edges of convex bodies that cross by more than 15 degrees as one point, however large the threshold.
 
+mod ball;
 mod flat;
 mod line;
 mod local;
@@ -180,6 +181,8 @@ pub enum Way {
     Single,
     /// Of convex bodies that lie on each other with flat faces: by the outlines of these.
     Flat,
+    /// Of a ball and any solid: by the feet of its centre.
+    Ball,
     /// Of any bodies: by boxes.
     Boxes,
 }
@@ -194,6 +197,7 @@ pub fn in_one_way(query: &PairQuery, time: f64, threshold: f64, way: Way) -> Opt
     let mut found = match way {
         Way::Single => whole(single::regions(&bodies)?),
         Way::Flat => whole(flat::regions(&bodies)?),
+        Way::Ball => whole(ball::regions(&bodies)?),
         Way::Boxes => in_boxes(&bodies),
     };
     found.cells = work.cells();
@@ -295,7 +299,8 @@ fn find(bodies: &Bodies) -> Regions {
         out.regions.sort_by_key(rank);
         return out;
     }
-    if let Some(regions) = flat::regions(bodies).or_else(|| single::regions(bodies)) {
+    let in_front = flat::regions(bodies).or_else(|| single::regions(bodies)).or_else(|| ball::regions(bodies));
+    if let Some(regions) = in_front {
         (out.regions, out.complete) = (regions, true);
         return out;
     }

@@ -111,12 +111,12 @@ pub fn faces(body: &Body, x: DVec3, scale: f64, rounding: f64) -> [u32; 3] {
         let Some(face) = facets.face_of(facet).map(|face| body.primitive.first_face + face) else { return };
         let off = (triangles::of_point(y, &facets.corners(facet)) - y).length();
         if off <= reach {
-            match near.iter_mut().find(|n| n.1 == face) {
-                Some(known) => known.0 = known.0.min(off),
-                None => near.push((off, face)),
-            }
+            near.push((off, face));
         }
     });
+    // Of each face its nearest facet.
+    near.sort_by(|p, q| p.1.cmp(&q.1).then(p.0.total_cmp(&q.0)));
+    near.dedup_by_key(|n| n.1);
     near.sort_by(|p, q| p.0.total_cmp(&q.0).then(p.1.cmp(&q.1)));
     out.iter_mut().zip(&near).for_each(|(to, n)| *to = n.1);
     out.sort_unstable();

@@ -85,6 +85,8 @@ pub struct Search<'a> {
     found: Vec<Found>,
     shared: Option<(Pair, f64)>,
     cells: u64,
+    /// No points of the bodies are nearer to each other: a length, as far as a run has come.
+    lower: f64,
 }
 
 impl<'a> Search<'a> {
@@ -114,11 +116,17 @@ impl<'a> Search<'a> {
             found: Vec::new(),
             shared: None,
             cells: 0,
+            lower: 0.0,
         })
     }
 
+    /// What a run that has told nothing has looked at, and proven of the distance from below.
+    pub fn left(&self) -> (u64, f64) {
+        (self.cells, self.lower)
+    }
+
     /// The least distance between two times; `None` where it is left to the search by parts.
-    pub fn run(mut self, from: f64, to: f64) -> Option<Distance> {
+    pub fn run(&mut self, from: f64, to: f64) -> Option<Distance> {
         self.add_span(from, to);
         let covers = self.covers([ALL; 2]);
         let start = self.relative[0].at(from);
@@ -136,6 +144,7 @@ impl<'a> Search<'a> {
         if lower > 0.0 && matches!(standing, Standing::Open) {
             return None;
         }
+        self.lower = lower.max(0.0);
         self.answer(lower.max(0.0))
     }
 
@@ -167,8 +176,7 @@ impl<'a> Search<'a> {
     /// How bodies stand at an instant at which their surfaces do not meet: where all corners, one of each connected part of a surface, lie
     /// outside of the other body, no surface is in the other body, and so none of its inside. Of a convex body any point tells; a mesh in
     /// it meets it.
-    fn standing(&self, at: &Instant) -> Standing {
-        let mut standing = Standing::Apart;
+    fn standing(&mut self, at: &Instant) -> Standing {
         for k in 0..2 {
             let (body, other) = (&self.bodies[k], &self.bodies[1 - k]);
             let middle = body.convex().filter(|_| !body.is_half_space()).map(|c| c.middle());
@@ -179,6 +187,11 @@ impl<'a> Search<'a> {
             }
             for x in shells.iter().map(|y| frame.point(*y)).chain(middle) {
                 let seen = |x| if k == 0 { at.b_point(x) } else { at.a_point(x) };
+                // A mesh may have thousands of shells.
+                self.cells += 1;
+                if self.cells >= self.limit || self.halt.is_some_and(Halt::is_over) {
+                    return Standing::Open;
+                }
                 let f = other.model.value(seen(x));
                 if f > self.rounding {
                     continue;
@@ -189,10 +202,10 @@ impl<'a> Search<'a> {
                     let [x, y] = if k == 0 { [x, at.b_point(x)] } else { [at.a_point(x), x] };
                     return Standing::Within(Pair { x, y, distance: 0.0 });
                 }
-                standing = Standing::Open;
+                return Standing::Open;
             }
         }
-        standing
+        Standing::Apart
     }
 
     fn best(&self) -> f64 {
@@ -466,7 +479,7 @@ impl<'a> Search<'a> {
     }
 
     /// The answer with a lower bound.
-    fn answer(mut self, lower: f64) -> Option<Distance> {
+    fn answer(&mut self, lower: f64) -> Option<Distance> {
         let best = self.shared.or_else(|| self.proven());
         let (mut pair, t) = best?;
         let at = self.relative[0].at(t);
