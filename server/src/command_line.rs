@@ -109,8 +109,17 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, program: &Program) -> 
         Ok(arguments) => arguments,
         // Help and version are such errors, too, of status 0.
         Err(e) => {
-            let _ = e.print();
-            return u8::try_from(e.exit_code()).unwrap_or(BAD_INPUT);
+            let written = written(e.print().and_then(|()| std::io::stdout().flush()));
+            let status = u8::try_from(e.exit_code()).unwrap_or(BAD_INPUT);
+            return match written {
+                Ok(()) => status,
+                // What is wrong goes to standard error, where nobody can be told that it cannot be written.
+                Err(_) if e.use_stderr() => status,
+                Err(sentence) => {
+                    say(&sentence);
+                    BAD_INPUT
+                }
+            };
         }
     };
     let environment = |name: &str| std::env::var_os(name);
@@ -253,7 +262,7 @@ fn replay(arguments: &ReplayArguments) -> Result<Done, Box<dyn Error>> {
     Ok(match () {
         () if replayed.difference.is_some() => Done::Differs,
         // Nobody knows what those that were left out had been answered.
-        () if replayed.dropped > 0 => Done::Undecided,
+        () if replayed.dropped > 0 || replayed.steps == 0 => Done::Undecided,
         () => Done::Well,
     })
 }
@@ -463,7 +472,10 @@ fn warn(sentence: &str) {
 
 /// A line on standard error, if anybody reads it.
 fn say(sentence: &str) {
-    let _ = writeln!(std::io::stderr(), "{sentence}");
+    // What a file calls itself or its objects may stand in it.
+    let lines: Vec<String> =
+        sentence.split('\n').map(|line| line.split('\t').map(clean).collect::<Vec<_>>().join("\t")).collect();
+    let _ = writeln!(std::io::stderr(), "{}", lines.join("\n"));
 }
 
 /// Refuses a geometry of volumes or cells where they are no scene.
@@ -551,9 +563,20 @@ fn write_picture(to: &Path, drawing: &Drawing) -> Result<(), String> {
 }
 
 /// Writes to standard output; a reader that has gone away is no error.
-fn print(text: &str) -> std::io::Result<()> {
-    match std::io::stdout().write_all(text.as_bytes()) {
-        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-        other => other,
+///
+/// # Errors
+/// One sentence.
+fn print(text: &str) -> Result<(), String> {
+    let mut out = std::io::stdout();
+    written(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
+}
+
+/// What became of something that was written to standard output.
+fn written(done: std::io::Result<()>) -> Result<(), String> {
+    match done {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(format!("standard output: expected to write, found: {e}"))
+        }
+        _ => Ok(()),
     }
 }

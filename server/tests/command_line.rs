@@ -248,3 +248,23 @@ fn inspect_tells_what_was_imported_and_how() {
     let scene = run(folder.path(), &["inspect", "s.toml"]);
     assert!(text(&scene.stdout).contains("  object b: model ball, group default, translating"));
 }
+
+/// What cannot be written is no success, whichever page it is; and what a name would do to a terminal it does not do in an error either.
+#[test]
+fn output_that_is_lost_is_told_and_names_in_errors_are_clean() {
+    let folder = folder(&[("ball.csg", BALL), ("s.toml", &scene(4.0))]);
+    for arguments in [&["--help"] as &[&str], &["--version"], &["check", "s.toml"], &["completions", "bash"]] {
+        let full = std::fs::File::options().write(true).open("/dev/full").expect("a device that is full");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_contactd"));
+        let out = command.current_dir(folder.path()).args(arguments).stdout(full).output().expect("the binary runs");
+        assert_eq!(out.status.code(), Some(2), "{arguments:?}");
+        let said = text(&out.stderr);
+        assert!(said.starts_with("standard output: expected to write, found: No space left on device"), "{said}");
+    }
+    let out = run(folder.path(), &["inspect", "\u{1b}[31mred.csg"]);
+    let said = text(&out.stderr);
+    assert!(out.status.code() == Some(2) && said.starts_with("\u{fffd}[31mred.csg: "), "{said:?}");
+    let out = run(folder.path(), &["serve", "--deadline", "99999999999"]);
+    let said = text(&out.stderr);
+    assert!(out.status.code() == Some(2) && said.contains("2147483648"), "{said:?}");
+}

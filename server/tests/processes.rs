@@ -3,6 +3,8 @@
 
 #[allow(dead_code, reason = "other tests use the rest of it")]
 mod harness;
+#[path = "processes/memory.rs"]
+mod memory;
 #[path = "processes/operator.rs"]
 mod operator;
 
@@ -650,6 +652,14 @@ fn queries_have_the_embedded_bits_and_follow_the_objects_also_to_a_successor() {
     assert!(asked(&mut session, &ids) == before, "asked of the successor");
     let nan = session.points(&[[0.0; 3], [f64::NAN, 0.0, 0.0]], &PointOptions::default(), None).unwrap_err();
     assert!(matches!(nan, Error::Refused { code: ErrorCode::NotFinite, index: Some(1), .. }), "{nan:?}");
+    // More than one command carries: each answer is the one that its point has alone, and an index counts from the first on.
+    let mut many: Vec<[f64; 3]> = (0..70_000).map(|i| [f64::from(i) * 1e-3, 0.0, 0.0]).collect();
+    let told = session.points(&many, &PointOptions::default(), Some(&ids[..1])).unwrap();
+    let last = session.points(&many[69_999..], &PointOptions::default(), Some(&ids[..1])).unwrap();
+    assert!(told.len() == 70_000 && told[69_999] == last[0] && told[69_998] != last[0], "{last:?}");
+    many[69_000][1] = f64::INFINITY;
+    let infinite = session.points(&many, &PointOptions::default(), Some(&ids[..1])).unwrap_err();
+    assert!(matches!(infinite, Error::Refused { code: ErrorCode::NotFinite, index: Some(69_000), .. }), "{infinite:?}");
     for (objects, tolerance, code) in
         [([ids[0], 77], 1e-6, ErrorCode::UnknownObject), ([ids[0], ids[1]], -1.0, ErrorCode::BadNumber)]
     {

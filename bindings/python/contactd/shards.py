@@ -129,7 +129,8 @@ def _claim(folder: pathlib.Path, about: dict) -> None:
 
 def _write(path: pathlib.Path, write) -> None:
     """A file that is there whole or not at all, whenever the process or the machine ends."""
-    handle, name = tempfile.mkstemp(prefix=".unfinished-", dir=path.parent)
+    prefix = f".unfinished-{path.name}-"
+    handle, name = tempfile.mkstemp(prefix=prefix, dir=path.parent)
     os.close(handle)
     try:
         write(name)
@@ -137,9 +138,15 @@ def _write(path: pathlib.Path, write) -> None:
             os.fsync(written.fileno())
         os.chmod(name, 0o644)
         os.replace(name, path)
-    except BaseException:
+    except FileNotFoundError:
+        # Another process has written the same one meanwhile, and taken this one for one that is left.
+        if not path.exists():
+            raise
+    finally:
         pathlib.Path(name).unlink(missing_ok=True)
-        raise
+    # Those of processes that were killed over it, or that write the same.
+    for left in path.parent.glob(f"{prefix}*"):
+        left.unlink(missing_ok=True)
 
 
 def run(

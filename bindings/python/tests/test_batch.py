@@ -300,6 +300,7 @@ def test_shards_that_are_killed_lose_no_row_and_give_none_twice(play, tmp_path):
         else:
             assert process.returncode == -signal.SIGKILL, (said, complained)
     assert kills == 10
+    assert not list(out.glob(".unfinished-part*")), "of processes that were killed"
     answers = pa.concat_tables([pq.read_table(p) for p in sorted(out.glob("part*.parquet"))])
     assert answers["id"].to_pylist() == list(range(len(whole)))
     assert answers.combine_chunks().equals(contactd.batch.solve(whole, paths).combine_chunks())

@@ -329,10 +329,13 @@ impl<T: Transport> Session<T> {
     /// They are exceptions of all rules, by the objects' names.
     ///
     /// # Errors
-    /// `Misuse` for an object that was not added here, or whose name is another's as well; otherwise as `set_rules`.
+    /// `Misuse` for an object that was not added here, one with itself, or one whose name is another's as well; otherwise as `set_rules`.
     pub fn allow(&mut self, pairs: &[[u32; 2]], allowed: bool) -> Result<(), Error> {
         if pairs.iter().flatten().any(|id| !self.company.members.contains_key(id)) {
             return Err(Error::Misuse("expected pairs of objects of this session"));
+        }
+        if pairs.iter().any(|[a, b]| a == b) {
+            return Err(Error::Misuse("expected pairs of two objects, found one object twice"));
         }
         self.settle()?;
         let before = self.company.allowed.clone();

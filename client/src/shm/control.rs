@@ -1,6 +1,7 @@
 //! The way to a server beside its steps: where it is, whether it lives, and what commands ask of it.
 
 use super::link::{self, ControlClient, Variant, system};
+use super::pages::{self, Pages};
 use super::watch::ProcessWatch;
 use crate::Error;
 use contactd_proto::control::{Answer, Command, ControlHeader, Envelope, decode, encode};
@@ -18,6 +19,7 @@ pub const SLICE: Duration = Duration::from_millis(50);
 pub struct Control {
     server: Notifier<Variant>,
     control: ControlClient,
+    pages: Pages,
     /// Its life.
     pub life: Life,
     /// The incarnation.
@@ -98,6 +100,7 @@ impl Control {
     pub fn with<T>(address: &Address, make: impl FnOnce(Self) -> Result<T, Error>) -> Result<T, Error> {
         let (incarnation, life) = find(address)?;
         let config = link::config(address, incarnation.epoch)?;
+        pages::room(0)?;
         let opened = link::node(&config).and_then(|node| Self::on(node, life, incarnation.epoch));
         match opened.and_then(make) {
             // What cannot be opened because its server is just going is no fault of the system.
@@ -134,7 +137,7 @@ impl Control {
             .notifier_builder()
             .create()
             .map_err(|e| system("wake port", e))?;
-        Ok(Self { server, control, life, epoch, node })
+        Ok(Self { server, control, pages: Pages::default(), life, epoch, node })
     }
 
     /// Asks something of a session (0: of none), and waits for the answer by `wait`.
@@ -149,11 +152,10 @@ impl Control {
         wait: impl Fn(Duration),
     ) -> Result<Answer, Error> {
         let bytes = encode(&Envelope { epoch: self.epoch, session, command }).map_err(Error::refused)?;
-        let mut request = self
-            .control
-            .loan_slice_uninit(bytes.len())
-            .map_err(|e| system("no memory for a command", e))?
-            .write_from_slice(&bytes);
+        self.pages.before(bytes.len())?;
+        let loan = self.control.loan_slice_uninit(bytes.len()).map_err(|e| system("no memory for a command", e))?;
+        self.pages.claim(loan.payload())?;
+        let mut request = loan.write_from_slice(&bytes);
         *request.user_header_mut() = ControlHeader { version: PROTOCOL_VERSION, reserved: 0 };
         let pending = request.send().map_err(|e| system("a command cannot be sent", e))?;
         self.wake_server();

@@ -6,6 +6,7 @@
 mod control;
 pub mod link;
 pub mod operator;
+pub mod pages;
 mod steps;
 pub mod watch;
 

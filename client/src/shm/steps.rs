@@ -2,6 +2,7 @@
 
 use super::control::{self, Control, SLICE};
 use super::link::{self, StepClient, Variant, system};
+use super::pages::Pages;
 use crate::Error;
 use crate::transport::{Opened, Transport};
 use contactd_proto::control::{Answer, Command};
@@ -47,6 +48,7 @@ struct Link {
     loan: Option<Loan>,
     wake: Option<Listener<Variant>>,
     steps: StepClient,
+    pages: Pages,
     control: Control,
     session: u64,
     spin: Duration,
@@ -101,6 +103,7 @@ impl Link {
             loan: None,
             wake: None,
             steps,
+            pages: Pages::default(),
             control,
             session: 0,
             spin: Duration::ZERO,
@@ -181,8 +184,11 @@ impl Transport for SharedMemory {
         let link = self.link()?;
         (link.reply, link.pending, link.loan) = (None, None, None);
         // iceoryx2 knows no empty slices: the header says how many records count.
-        let slice = link.steps.loan_slice(records.max(1)).map_err(|e| system("no memory for a batch", e))?;
-        link.loan = Some(slice);
+        let n = records.max(1);
+        link.pages.before(n * size_of::<PoseRecord>())?;
+        let slice = link.steps.loan_slice_uninit(n).map_err(|e| system("no memory for a batch", e))?;
+        link.pages.claim(slice.payload())?;
+        link.loan = Some(slice.write_from_fn(|_| PoseRecord::default()));
         match &mut link.loan {
             Some(slice) => {
                 slice.user_header_mut().records = records as u32;

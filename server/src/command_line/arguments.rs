@@ -46,7 +46,8 @@ pub(super) enum Command {
     },
     /// Records the steps of a running server into a file, until SIGINT or SIGTERM.
     Record(RecordArguments),
-    /// Repeats a recording and compares every bit; the exit status is 1 where an answer differs.
+    /// Repeats a recording and compares every bit; the exit status is 1 where an answer differs, 3 where steps were left out or
+    /// the file has none.
     Replay(ReplayArguments),
     /// A server process and a client process on real parts: steps, earliest contacts, latencies.
     Demo {
@@ -155,7 +156,7 @@ pub(super) struct ServeArguments {
     #[arg(long)]
     pub config: Option<PathBuf>,
     /// Milliseconds within which a step is answered, undecided where it is not known by then; 0: no such limit.
-    #[arg(long, value_name = "MS")]
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(..=1 << 31))]
     pub deadline: Option<u64>,
     /// A folder of this machine: texts that clients send may import files of it and below. Else they import none.
     #[arg(long, value_name = "DIR")]

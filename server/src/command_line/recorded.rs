@@ -65,7 +65,10 @@ pub(super) fn model(content: &Content, cache: Option<&Cache>) -> Result<Shown, S
 
 fn act(run: Run, models: Vec<usize>) -> Act {
     let (first, last) = (run.first, run.first + run.scenes.len() as u64 - 1);
-    let title = format!("session {}, {} steps from {first} on", run.session, last - first + 1);
+    let title = match last - first {
+        0 => format!("session {}, step {first}", run.session),
+        more => format!("session {}, {} steps from {first} on", run.session, more + 1),
+    };
     let scenes = run.scenes;
     let steps = scenes.len();
     let name = title.clone();

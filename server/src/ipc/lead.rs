@@ -593,6 +593,9 @@ impl<P: Port> Lead<P> {
         for file in self.recordings.bury() {
             self.log.info(|| format!("{file}: the process that asked for the recording has ended"));
         }
+        if let Some(why) = self.port.trouble() {
+            self.log.warn(&format!("a reply is lost: {why}"));
+        }
         if self.hangup.swap(false, Ordering::Relaxed) {
             self.log.warn("SIGHUP: there is nothing to read again, the server goes on");
         }

@@ -34,6 +34,9 @@ pub trait Port: Send + 'static {
     /// `System`.
     fn wake_of(&self, session: u64) -> Result<Self::Wake, Error>;
 
+    /// Why the last reply that could not be written was lost: a sentence, once.
+    fn trouble(&self) -> Option<String>;
+
     /// Shows the server's state.
     fn show(&mut self, status: StatusRecord);
 
@@ -52,8 +55,7 @@ pub trait StepCall: Send + 'static {
     /// The poses that came with it.
     fn records(&self) -> &[PoseRecord];
 
-    /// Writes a reply of `n` slots, made one by one. Where there is no room for them the reply says that they are cut off; `None`
-    /// where there is room for nothing.
+    /// Writes a reply of `n` slots, made one by one; `None` where there is no room for them.
     fn write(&self, n: usize, reply: StepReply, slot: &dyn Fn(usize) -> ContactRecord) -> Option<Self::Reply>;
 
     /// Sends a reply, if there is one, and ends the call. One that cannot be delivered is dropped.

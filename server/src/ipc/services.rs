@@ -8,6 +8,7 @@ use super::config::ServerConfig;
 use super::port::{Bell, CommandCall, Port, StepCall, Wake};
 use contactd_client::Error;
 use contactd_client::shm::link::{self, ControlServer, Shared, StepServer, system};
+use contactd_client::shm::pages::{self, Pages};
 use contactd_proto::control::ControlHeader;
 use contactd_proto::names::{self, Address, PROTOCOL_VERSION};
 use contactd_proto::status::StatusRecord;
@@ -18,7 +19,10 @@ use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::writer::{EntryHandleMut, Writer};
 use iceoryx2::prelude::*;
 use iceoryx2::response_mut::ResponseMut;
+use iceoryx2::response_mut_uninit::ResponseMutUninit;
 use iceoryx2::service::port_factory::event::PortFactory as EventService;
+use std::mem::MaybeUninit;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// The way to wake the client of a session.
@@ -47,25 +51,55 @@ impl Bell for Notifier<Shared> {
 type StepRequestInPlace = ActiveRequest<Shared, [PoseRecord], StepRequest, [ContactRecord], StepReply>;
 type CommandInPlace = ActiveRequest<Shared, [u8], ControlHeader, [u8], ControlHeader>;
 
-impl StepCall for StepRequestInPlace {
+/// The memory that replies of one port are written to.
+#[derive(Default)]
+struct Replies {
+    pages: Pages,
+    /// Why a reply was lost, until it is asked for.
+    trouble: Mutex<Option<String>>,
+}
+
+impl Replies {
+    /// What was lent, where it can be written to.
+    fn keep<T>(&self, lent: Result<T, Error>) -> Option<T> {
+        lent.map_err(|e| *self.trouble.lock().unwrap_or_else(PoisonError::into_inner) = Some(e.to_string())).ok()
+    }
+
+    fn trouble(&self) -> Option<String> {
+        self.trouble.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+}
+
+/// A request for a step, in place.
+pub struct StepInPlace {
+    request: StepRequestInPlace,
+    replies: Arc<Replies>,
+}
+
+impl StepInPlace {
+    fn lend(&self, n: usize) -> Result<ResponseMutUninit<Shared, [MaybeUninit<ContactRecord>], StepReply>, Error> {
+        self.replies.pages.before(n * size_of::<ContactRecord>())?;
+        let loan = self.request.loan_slice_uninit(n).map_err(|e| system("no memory for records", e))?;
+        self.replies.pages.claim(loan.payload())?;
+        Ok(loan)
+    }
+}
+
+impl StepCall for StepInPlace {
     type Reply = ResponseMut<Shared, [ContactRecord], StepReply>;
 
     fn request(&self) -> StepRequest {
-        *self.user_header()
+        *self.request.user_header()
     }
 
     fn records(&self) -> &[PoseRecord] {
-        self.payload()
+        self.request.payload()
     }
 
     /// Writes the reply once, into slots of shared memory.
     fn write(&self, n: usize, reply: StepReply, slot: &dyn Fn(usize) -> ContactRecord) -> Option<Self::Reply> {
         // iceoryx2 knows no empty slices: the header says how many slots count.
-        let (loan, reply) = match self.loan_slice_uninit(n.max(1)) {
-            Ok(loan) => (loan, reply),
-            // The step was taken, its records cannot be told: the client learns that they are cut off.
-            Err(_) => (self.loan_slice_uninit(1).ok()?, StepReply { records: 0, slots: 0, truncated: 1, ..reply }),
-        };
+        let loan = self.replies.keep(self.lend(n.max(1)))?;
         let reported = (reply.records + reply.slots) as usize;
         let mut response = loan.write_from_fn(|i| if i < reported { slot(i) } else { ContactRecord::default() });
         *response.user_header_mut() = reply;
@@ -78,17 +112,32 @@ impl StepCall for StepRequestInPlace {
     }
 }
 
-impl CommandCall for CommandInPlace {
+/// A request with a command, in place.
+pub struct CommandCallInPlace {
+    request: CommandInPlace,
+    replies: Arc<Replies>,
+}
+
+impl CommandCallInPlace {
+    fn lend(&self, n: usize) -> Result<ResponseMutUninit<Shared, [MaybeUninit<u8>], ControlHeader>, Error> {
+        self.replies.pages.before(n)?;
+        let loan = self.request.loan_slice_uninit(n).map_err(|e| system("no memory for an answer", e))?;
+        self.replies.pages.claim(loan.payload())?;
+        Ok(loan)
+    }
+}
+
+impl CommandCall for CommandCallInPlace {
     fn version(&self) -> u32 {
-        self.user_header().version
+        self.request.user_header().version
     }
 
     fn bytes(&self) -> &[u8] {
-        self.payload()
+        self.request.payload()
     }
 
     fn send(self, bytes: &[u8]) {
-        let Ok(loan) = self.loan_slice_uninit(bytes.len()) else { return };
+        let Some(loan) = self.replies.keep(self.lend(bytes.len())) else { return };
         let mut response = loan.write_from_slice(bytes);
         *response.user_header_mut() = ControlHeader { version: PROTOCOL_VERSION, reserved: 0 };
         let _ = response.send();
@@ -114,6 +163,8 @@ fn patiently<T>(make: impl Fn() -> Result<T, Error>) -> Result<T, Error> {
 pub struct Services {
     steps: StepServer,
     control: ControlServer,
+    /// Of steps, and of commands.
+    replies: [Arc<Replies>; 2],
     /// Woken by clients, and by the bell.
     wake: Listener<Shared>,
     status: EntryHandleMut<Shared, u32, StatusRecord>,
@@ -141,6 +192,7 @@ impl Services {
         config: &ServerConfig,
         status: StatusRecord,
     ) -> Result<(Self, Notifier<Shared>), Error> {
+        pages::room(0)?;
         let node = link::node_of::<Shared>(&link::config(address, epoch)?)?;
         // A few more than sessions: clients that are just coming or going, and those that only look at the status.
         let clients = config.sessions + 8;
@@ -167,7 +219,7 @@ impl Services {
             .create()
             .map_err(|e| system("status writer", e))?;
         let status = writer.entry::<StatusRecord>(&link::STATUS_KEY).map_err(|e| system("status entry", e))?;
-        let services = Self { steps, control, wake, status, _writer: writer, node };
+        let services = Self { steps, control, replies: Default::default(), wake, status, _writer: writer, node };
         Ok((services, bell))
     }
 }
@@ -230,18 +282,20 @@ fn control_port(node: &Node<Shared>, clients: usize) -> Result<ControlServer, Er
 }
 
 impl Port for Services {
-    type Step = StepRequestInPlace;
-    type Command = CommandInPlace;
+    type Step = StepInPlace;
+    type Command = CommandCallInPlace;
     type Wake = ClientWake;
     type Bell = Notifier<Shared>;
 
     fn next_step(&mut self) -> Option<Self::Step> {
         // A failed receive concerns one client's connection; the others go on.
-        self.steps.receive().ok().flatten()
+        let request = self.steps.receive().ok().flatten()?;
+        Some(StepInPlace { request, replies: self.replies[0].clone() })
     }
 
     fn next_command(&mut self) -> Option<Self::Command> {
-        self.control.receive().ok().flatten()
+        let request = self.control.receive().ok().flatten()?;
+        Some(CommandCallInPlace { request, replies: self.replies[1].clone() })
     }
 
     fn wait(&self, longest: Duration) -> bool {
@@ -250,6 +304,7 @@ impl Port for Services {
 
     /// Its service is created here.
     fn wake_of(&self, session: u64) -> Result<ClientWake, Error> {
+        pages::room(0)?;
         patiently(|| {
             let service = self
                 .node
@@ -263,6 +318,10 @@ impl Port for Services {
             let notifier = service.notifier_builder().create().map_err(|e| system("a session's wake port", e))?;
             Ok(ClientWake { notifier, service })
         })
+    }
+
+    fn trouble(&self) -> Option<String> {
+        self.replies.iter().find_map(|replies| replies.trouble())
     }
 
     fn show(&mut self, status: StatusRecord) {

@@ -90,6 +90,8 @@ pub struct Stage {
     models: BTreeMap<u32, Drawn>,
     objects: BTreeMap<u32, ObjectSpec>,
     tracks: Tracks,
+    /// Objects whose frame was moved in them since: the model in the object's frame now. They stay drawn as they were, and move.
+    reframed: BTreeMap<u32, Pose>,
     /// Objects that are not drawn as they are.
     undrawn: BTreeSet<u32>,
     /// What is drawn and is no more.
@@ -108,6 +110,7 @@ impl Stage {
             models: BTreeMap::new(),
             objects: BTreeMap::new(),
             tracks: Tracks::default(),
+            reframed: BTreeMap::new(),
             undrawn: BTreeSet::new(),
             gone: Vec::new(),
             moved: Vec::new(),
@@ -169,6 +172,7 @@ impl Stage {
             drawn.objects += 1;
         }
         self.undrawn.insert(object.id);
+        self.reframed.remove(&object.id);
         self.objects.insert(object.id, object);
     }
 
@@ -211,6 +215,7 @@ impl Stage {
                     self.gone.push(self.name(&spec));
                 }
                 self.tracks.removed(*id);
+                self.reframed.remove(id);
             }
             Command::Restore(tracks) => {
                 for track in tracks {
@@ -222,15 +227,12 @@ impl Stage {
             }
             Command::Reframe(frames) => {
                 for frame in frames {
-                    let Some((spec, Ok((place, pose)))) =
-                        self.objects.get_mut(&frame.object).zip(Some(frame.checked()))
-                    else {
-                        continue;
-                    };
-                    spec.place = place.into();
-                    self.undrawn.insert(spec.id);
-                    self.tracks.put(spec.id, MotionState::resting(pose));
-                    self.moved.push(spec.id);
+                    let Ok((place, pose)) = frame.checked() else { continue };
+                    if self.objects.contains_key(&frame.object) {
+                        self.reframed.insert(frame.object, place);
+                        self.tracks.put(frame.object, MotionState::resting(pose));
+                        self.moved.push(frame.object);
+                    }
                 }
             }
             Command::Open { .. }
@@ -271,12 +273,16 @@ impl Stage {
             .iter()
             .filter_map(|id| {
                 let (object, track) = (self.objects.get(id)?, self.tracks.get(*id)?);
+                let end = match (self.reframed.get(id), object.place.checked()) {
+                    (Some(place), Ok(drawn)) => track.end.compose(place).compose(&drawn.inverse()),
+                    _ => track.end,
+                };
                 Some(FrameTransform {
                     timestamp: time.into(),
                     parent_frame_id: WORLD,
                     child_frame_id: self.name(object),
-                    translation: track.end.position.into(),
-                    rotation: track.end.rotation.into(),
+                    translation: end.position.into(),
+                    rotation: end.rotation.into(),
                 })
             })
             .collect();

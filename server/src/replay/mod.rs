@@ -69,6 +69,7 @@ impl Replayed {
     pub fn text(&self) -> String {
         let many = |n: u64, one: &str| format!("{n} {one}{}", if n == 1 { "" } else { "s" });
         let mut out = match &self.difference {
+            None if self.steps == 0 => "no step is in the file: nothing was repeated\n".to_owned(),
             None => {
                 format!("{} of {} repeated, all bits equal\n", many(self.steps, "step"), many(self.sessions, "session"))
             }
@@ -246,11 +247,11 @@ pub struct Told {
     pub session: u64,
     /// Its number in the recording, from 1.
     pub number: u64,
-    /// Something has changed since the session's step before it: its objects, models, rules, resolution.
+    /// Its objects or models are not those of the session's step before it, where they stand and their frames left out.
     pub is_fresh: bool,
     /// What the models of the scene were made of, in order; of a step that is fresh.
     pub contents: Vec<Arc<Content>>,
-    /// The objects of the scene, in order, without where they stand; of a step that is fresh.
+    /// The objects of the scene, in order, without where they stand and their frames; of a step that is fresh.
     pub objects: Vec<ObjectSpec>,
     /// The text of a scene file.
     pub scene: String,
@@ -261,6 +262,8 @@ pub struct Following {
     recording: Recording,
     name: String,
     sessions: BTreeMap<u64, Followed>,
+    /// Models and objects of a session's last step.
+    told: BTreeMap<u64, (Vec<Arc<Content>>, Vec<ObjectSpec>)>,
     /// Sessions in which nothing has changed since their last step.
     settled: BTreeSet<u64>,
     steps: u64,
@@ -282,7 +285,8 @@ impl Following {
 
     fn of(path: &Path, recording: Recording) -> Self {
         let name = path.display().to_string();
-        Self { recording, name, sessions: BTreeMap::new(), settled: BTreeSet::new(), steps: 0 }
+        let (sessions, told, settled) = (BTreeMap::new(), BTreeMap::new(), BTreeSet::new());
+        Self { recording, name, sessions, told, settled, steps: 0 }
     }
 
     /// Bytes of the file that were read, and those that were written since.
@@ -325,11 +329,17 @@ impl Following {
                     followed.tracks.take(&step.records, step.request.advance);
                     let wrong = |e: String| refused(name, format!("step {number}: {e}"));
                     let folder = followed.scene(&self.recording, number, &step).map_err(wrong)?;
-                    let is_fresh = self.settled.insert(session);
                     let nowhere = WirePose { position: [0.0; 3], rotation: [0.0, 0.0, 0.0, 1.0] };
-                    let objects = folder.objects.iter().map(|o| ObjectSpec { pose: nowhere, ..o.spec.clone() });
-                    let (contents, objects) =
-                        if is_fresh { (folder.contents(), objects.collect()) } else { (Vec::new(), Vec::new()) };
+                    let anywhere = |spec: &ObjectSpec| ObjectSpec { place: nowhere, pose: nowhere, ..spec.clone() };
+                    let (mut contents, mut objects, mut is_fresh) = (Vec::new(), Vec::new(), false);
+                    if self.settled.insert(session) {
+                        let now = (folder.contents(), folder.objects.iter().map(|o| anywhere(&o.spec)).collect());
+                        is_fresh = self.told.get(&session) != Some(&now);
+                        if is_fresh {
+                            (contents, objects) = now.clone();
+                            self.told.insert(session, now);
+                        }
+                    }
                     let scene = folder.text().map_err(|e| wrong(e.to_string()))?;
                     return Ok(Some(Told { session, number, is_fresh, contents, objects, scene }));
                 }

@@ -9,7 +9,7 @@
 //!
 //! Source: Khronos Group, "glTF 2.0 specification" (2021), sections 3 and 4.
 
-use super::show::{Show, Step};
+use super::show::{Moved, Show, Step};
 use crate::math::Aabb;
 use crate::picture::scene::COLORS;
 use crate::solid::Solid;
@@ -23,6 +23,8 @@ use serde_json::{Value, json};
 const LEVELS: u32 = 6;
 /// A key of a rotation is no farther from the next one, radians.
 const TURN: f64 = std::f64::consts::FRAC_PI_4;
+/// The same of an object whose frame was moved in it: between two keys what is drawn goes straight on, not on an arc.
+const ARC: f64 = TURN / 16.0;
 /// An object that a step begins with elsewhere than the one before has left it goes there in so many seconds before.
 const JUMP: f64 = 1e-3;
 /// Sides of a mark, and its size of the scene's.
@@ -56,13 +58,13 @@ fn act_of(file: &mut File, show: &Show, act: usize, meshes: (&[Option<usize>], O
     let mut animation = Animation::default();
     let mut nodes = Vec::new();
     for (i, object) in first.objects.iter().enumerate() {
-        let motions: Vec<Motion> = steps.iter().map(|step| step.objects[i].motion).collect();
+        let motions: Vec<Driven> = steps.iter().map(|step| Driven::new(&step.objects[i], object)).collect();
         let mut body = placed(&object.place);
         if let Some(mesh) = meshes.0[object.model] {
             body["mesh"] = mesh.into();
         }
         let body = file.node(body);
-        let mut frame = placed(&motions[0].start);
+        let mut frame = placed(&motions[0].motion.start);
         frame["name"] = object.name.as_str().into();
         frame["children"] = json!([body]);
         let frame = file.node(frame);
@@ -93,6 +95,31 @@ fn act_of(file: &mut File, show: &Show, act: usize, meshes: (&[Option<usize>], O
     file.scenes.push(json!({ "name": title, "nodes": [root], "extras": { "unit": first.unit, "steps": count } }));
     file.animations.extend(animation.told(title));
     Ok(())
+}
+
+/// An object over a step, in the frame that it is drawn in.
+struct Driven {
+    motion: Motion,
+    /// The frame that it is drawn in, in the object's frame; `None` where they are the same.
+    moved: Option<Pose>,
+}
+
+impl Driven {
+    /// Over a step; it is drawn as of the first one.
+    fn new(now: &Moved, first: &Moved) -> Self {
+        let moved = (now.place != first.place).then(|| now.place.compose(&first.place.inverse()));
+        Self { motion: now.motion, moved }
+    }
+
+    fn at(&self, t: f64) -> Pose {
+        self.moved.map_or_else(|| self.motion.at(t), |moved| self.motion.at(t).compose(&moved))
+    }
+
+    /// Steps between keys.
+    fn keys(&self) -> usize {
+        let turn = if self.moved.is_some() { ARC } else { TURN };
+        (self.motion.spin.length() / turn).ceil().max(1.0) as usize
+    }
 }
 
 /// Metres in a unit that a scene may name.
@@ -275,10 +302,10 @@ impl Animation {
     }
 
     /// An object's frame over all steps; nothing of one that rests.
-    fn object(&mut self, file: &mut File, node: usize, motions: &[Motion]) {
+    fn object(&mut self, file: &mut File, node: usize, motions: &[Driven]) {
         let (mut times, mut poses): (Vec<f64>, Vec<Pose>) = (Vec::new(), Vec::new());
         for (i, motion) in motions.iter().enumerate() {
-            let keys = (motion.spin.length() / TURN).ceil().max(1.0) as usize;
+            let keys = motion.keys();
             for key in 0..=keys {
                 let t = key as f64 / keys as f64;
                 let (at, pose) = (i as f64 + t, motion.at(t));

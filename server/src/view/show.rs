@@ -132,8 +132,6 @@ struct ObjectTold {
     name: String,
     model: usize,
     fixed: bool,
-    /// Position and rotation (x, y, z, w) of the model in the object's frame.
-    place: [f64; 7],
     group: String,
 }
 
@@ -142,6 +140,8 @@ struct ObjectTold {
 struct StepTold {
     /// Of each object: position and rotation at t = 0, displacement and rotation vector over the step.
     motions: Vec<[f64; 13]>,
+    /// Of each object: position and rotation (x, y, z, w) of the model in the object's frame.
+    places: Vec<[f64; 7]>,
     summary: String,
     safe_time: f64,
     undecided: bool,
@@ -240,7 +240,6 @@ impl Show {
                 name: o.name.clone(),
                 model: act.models[o.model],
                 fixed: o.is_static,
-                place: seven(&o.place),
                 group: o.group.clone(),
             };
             let objects = scene.objects.iter().map(object).collect();
@@ -378,6 +377,7 @@ impl Show {
         };
         Ok(StepTold {
             motions: scene.objects.iter().map(motion).collect(),
+            places: scene.objects.iter().map(|o| seven(&o.place)).collect(),
             summary: summary(&pairs, outcome.safe_time),
             safe_time: outcome.safe_time,
             undecided: outcome.undecided,

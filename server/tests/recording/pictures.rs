@@ -3,7 +3,7 @@
 use super::{MODELS, PATIENCE, runtime_folder};
 use contactd::ipc::{Embedded, ServerConfig};
 use contactd_client::proto::{Pose, PoseRecord};
-use contactd_client::{Object, Session};
+use contactd_client::{Frame, Object, Session};
 use glam::DVec3;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -211,4 +211,62 @@ fn many_objects_are_drawn_in_messages_of_bounded_length() {
     assert_eq!(drawn.len(), 600);
     // Each as fine as one alone would be: ten times as much.
     assert!(bytes.len() < 36 << 20, "{} bytes", bytes.len());
+}
+
+/// A body whose frame is moved in it, as a robot's links are before each step, is drawn once and stands where it stands; in a browser
+/// its steps are one act.
+#[test]
+fn a_body_that_is_driven_by_its_frame_is_drawn_once_and_stands_where_it_is() {
+    let folder = runtime_folder();
+    let path = folder.path().join("arm.mcap");
+    let mut session = contactd::embedded(&ServerConfig::default()).unwrap();
+    let bar = session.load_model("bar.csg", "cube(size = [2, 0.2, 0.2]);").unwrap().id;
+    let first = Pose::at(DVec3::new(0.5, 0.0, 0.25));
+    let id = session.add_object(Object::new("bar", bar).place(first).at(Pose::at(DVec3::Z))).unwrap();
+    session.record(&path).unwrap();
+    // Where the model's frame stands at first, and at both ends of each step.
+    let mut truth = vec![Pose::at(DVec3::Z).compose(&first)];
+    for k in 0..8 {
+        let turn = |angle: f64| glam::DQuat::from_rotation_z(angle);
+        let place = Pose::new(DVec3::new(0.1 * f64::from(k), 0.3, 0.0), turn(0.2 * f64::from(k)));
+        let from = Pose::new(DVec3::new(0.0, f64::from(k), 1.0), turn(-0.3 * f64::from(k)));
+        session.reframe(&[Frame { object: id, place, pose: from }]).unwrap();
+        let to = Pose::new(from.position, from.rotation * turn(0.4));
+        session.begin_step(1).unwrap()[0] = PoseRecord::end(id, &to);
+        session.finish(PATIENCE).unwrap();
+        truth.extend([from.compose(&place), to.compose(&place)]);
+    }
+    session.stop_recording().unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let (mut drawn, mut stands) = (Vec::new(), Vec::new());
+    let three = |v: &Value| DVec3::from(["x", "y", "z"].map(|name| v[name].as_f64().unwrap()));
+    let four = |v: &Value| glam::DQuat::from_array(["x", "y", "z", "w"].map(|name| v[name].as_f64().unwrap()));
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        if message.channel.schema.is_none() {
+            continue;
+        }
+        let value: Value = serde_json::from_slice(&message.data).unwrap();
+        for entity in value.get("entities").and_then(Value::as_array).into_iter().flatten() {
+            for list in entity["triangles"].as_array().unwrap() {
+                drawn.push(Pose::new(three(&list["pose"]["position"]), four(&list["pose"]["orientation"])));
+            }
+        }
+        for frame in value.get("transforms").and_then(Value::as_array).into_iter().flatten() {
+            stands.push(Pose::new(three(&frame["translation"]), four(&frame["rotation"])));
+        }
+    }
+    assert_eq!(drawn.len(), 1, "its surface is told once");
+    let corners = [DVec3::ZERO, DVec3::new(2.0, 0.2, 0.2)];
+    let are_one = |frame: &Pose, truth: &Pose| {
+        corners.iter().all(|c| frame.point(drawn[0].point(*c)).distance(truth.point(*c)) < 1e-9)
+    };
+    // A step may begin before its predecessor is told.
+    let mut at = 0;
+    for frame in &stands {
+        at += truth[at..].iter().position(|truth| are_one(frame, truth)).expect("it stands where it was, in order");
+    }
+    assert_eq!(at, truth.len() - 1, "the last step is told");
+    let (runs, _) = contactd::replay::runs(&path, 100).unwrap();
+    assert_eq!(runs.iter().map(|run| run.scenes.len()).collect::<Vec<_>>(), [8]);
 }

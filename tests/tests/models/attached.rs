@@ -353,6 +353,8 @@ fn another_object_of_the_name_of_one_that_is_gone_is_tested() {
         for refused in [session.attach(part, wall, &[]), session.allow(&[[twin, wall]], true)] {
             assert!(matches!(refused, Err(Error::Misuse(said)) if said.contains("by names")), "{refused:?}");
         }
+        let itself = session.allow(&[[wall, wall]], true);
+        assert!(matches!(itself, Err(Error::Misuse(said)) if said.contains("one object twice")), "{itself:?}");
         let refused = session.attach(part, wall, &[77]);
         assert!(matches!(refused, Err(Error::Misuse(said)) if said.contains("may touch")), "{refused:?}");
     }

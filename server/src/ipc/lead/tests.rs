@@ -112,6 +112,10 @@ impl Port for Channels {
         Ok(Listens(self.seen.clone()))
     }
 
+    fn trouble(&self) -> Option<String> {
+        None
+    }
+
     fn show(&mut self, status: StatusRecord) {
         *self.seen.status.lock().unwrap() = status;
     }

@@ -57,7 +57,7 @@ export class Scene {
 
     /** The poses of an act's models at a moment of a step. */
     poses(act, step, t) {
-        return this.acts[act].objects.map((o, i) => poseAt(step.motions[i], o.place, t));
+        return this.acts[act].objects.map((_, i) => poseAt(step.motions[i], step.places[i], t));
     }
 
     /** The colour of a model. */
